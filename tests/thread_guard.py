@@ -35,7 +35,6 @@ REVIEWED: dict[str, set[str]] = {
         "_buffer",
         "_exchanged",
         "_packed",
-        "unpacking",
     },
     "devices/main_thread.py": {
         "RelayedDevice.__init__",
@@ -48,7 +47,6 @@ REVIEWED: dict[str, set[str]] = {
         "RelayedDevice.current",
         "RelayedDevice.release",
         "_called",
-        "_keep_looking",
         "ask",
         "soon",
     },

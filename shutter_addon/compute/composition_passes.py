@@ -16,8 +16,6 @@ PAIR = 2
 
 MODES = {"average": 0, "lightest": 1, "darkest": 2, "median": 3}
 EDGES = {"hold": 0, "mirror": 1, "shorten": 2}
-# The format of a picture: {whether it is levels: format}.
-PICTURE = {False: "rgba32f", True: "rgba8"}
 LEVELS = read_pass("display", "OVER_BLACK")
 # Rows of pixels that one invocation composes: {way: rows}; BLOCK for all others.
 _LINES = {"sums": PAIR, "search": 4}
@@ -89,16 +87,6 @@ def moved_way(state: FrameState, values: np.ndarray, motions: int, mixed: int, q
 def filled_rows(rows: int) -> float:
     """Return the number of pieces for which compose_sums is compiled, at least `rows`; infinity if there is none."""
     return next((filled for filled in _ROWS if filled >= rows), np.inf)
-
-
-def selection(groups: int, shutters: int) -> Pass:
-    """Return the pass that picks the coefficients of some shutters, in `groups` of four, from those of all shutters."""
-    return read_pass("ways", "SELECT", GROUPS=groups, ALL=shutters)
-
-
-def way_sum(begins: bool, levels: bool) -> Pass:
-    """Return the pass that adds a share of a picture or of coefficients to a sum."""
-    return read_pass("ways", BEGINS=int(begins), LEVELS=int(levels))
 
 
 def padded(values: np.ndarray) -> np.ndarray:

@@ -23,16 +23,13 @@ from .composition_passes import (
     EDGES,
     LEVELS,
     MODES,
-    PICTURE,
     composition,
     filled_rows,
     lines_of,
     moved_tables,
     moved_way,
-    selection,
     table,
     way_of,
-    way_sum,
 )
 from .request import Coefficients, Handle, Request
 from .running_sums import STORED_SUMS, Sums, open_window
@@ -183,10 +180,8 @@ class Displaying:
         size = _COLUMNS, -(-len(places) // _COLUMNS)
         numbers = np.zeros((size[1], _COLUMNS), np.uint32)
         numbers.ravel()[: len(places)] = places
-        sent, picked = (
-            self._textures.filled("places", [numbers], "r32ui"),
-            self._textures.of("picked", (*size, 1), "rgba32f"),
-        )
+        sent = self._textures.filled("places", [numbers], "r32ui")
+        picked = self._textures.of("picked", (*size, 1))
         images = {"picture": picture, "places": sent, "picked": picked}
         self._device.run(PICK, size, images=images, size=size, width=picture.size[0])
         return self._device.read(picked)[0].reshape(-1, 4)[: len(places), :3]
@@ -242,7 +237,7 @@ class GPUCompositor:
 
     def read(self, drawn: Texture) -> np.ndarray:
         picture = self.device.read(drawn)[0]
-        return picture if drawn.kind == PICTURE[True] else picture[::-1]
+        return picture if drawn.kind == "rgba8" else picture[::-1]
 
     def over_black(self, drawn: Texture) -> np.ndarray:
         size = drawn.size[:2]
@@ -308,8 +303,8 @@ class GPUCompositor:
             images = {"part": drawn, "share": share, "mixed": window.mixed()}
             if levels:
                 images["picture"] = window.picture(levels=True)
-            program, bits = way_sum(not number, levels), _bits(coefficients)
-            self.device.run(program, size, images=images, size=size, given=size, block_bits=bits)
+            program = read_pass("ways", BEGINS=int(not number), LEVELS=int(levels))
+            self.device.run(program, size, images=images, size=size, given=size, block_bits=_bits(coefficients))
         return window.picture(levels=True) if request.levels else window.mixed()
 
     def _selected(self, handle: Texture, chosen: tuple[int, ...], count: int) -> tuple[Texture, Texture]:
@@ -321,7 +316,8 @@ class GPUCompositor:
         share = self._textures.of("share", (width, height, 1), "r32f")
         images = {"coefficients": handle, "selected": selected, "share": share}
         given: Given = {"size": (width, height), "count": len(chosen), "blocks": {"chosen": numbers}}
-        self.device.run(selection(groups, count), (width, height), images=images, **given)
+        program = read_pass("ways", "SELECT", GROUPS=groups, ALL=count)
+        self.device.run(program, (width, height), images=images, **given)
         return selected, share
 
     def _draw_on_host(self, window: Handle, request: Request, coefficients: Coefficients) -> Texture:

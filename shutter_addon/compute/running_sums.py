@@ -100,8 +100,6 @@ class Sums(Window):
     tiled: whether pixels are stored tile by tile, in TILE
     """
 
-    _loading: tuple[tuple[str, str], ...] = (("frame", "rgba8"),)
-
     def __init__(self, device: Device, source: FrameSource, capacity: int, shutters: int = 1) -> None:
         self.layers = capacity + 1
         self.start = self.stop = 0
@@ -117,11 +115,6 @@ class Sums(Window):
         fits = across * down * self.layers <= device.max_size and -(-source.height // down) <= device.max_layers
         self.tiled = stores_rows(device) and fits
         super().__init__(device, source, capacity, shutters)
-
-    def _allocate(self) -> None:
-        super()._allocate()
-        if self.source.step > 1:
-            self._two_frames()
 
     @property
     def held(self) -> Collection[int]:
@@ -274,7 +267,8 @@ class Sums(Window):
     def _filmed(self, moment: Moment) -> tuple[Texture, int]:
         """The two frames of a moment on the device, and the layer of the first: they stay for all moments of their
         pair, and one for the next."""
-        texture, sent = self._two_frames(), self._sent
+        texture = self._extra.of("filmed", (self.source.width, self.source.height, 2), "r32ui")
+        sent = self._sent
         start = int(sent.get(1) == moment.pair[0] or sent.get(0) == moment.pair[1])
         for layer, number, frame in zip((start, 1 - start), moment.pair, moment.ends, strict=True):
             if sent.get(layer) != number:
@@ -282,9 +276,6 @@ class Sums(Window):
                 self.device.write(texture, numbers, layer)
                 sent[layer] = number
         return texture, start
-
-    def _two_frames(self) -> Texture:
-        return self._extra.of("filmed", (self.source.width, self.source.height, 2), "r32ui")
 
     def release(self) -> None:
         self._frames, self._light, self._sent, self._vectors = {}, None, {}, None
@@ -295,8 +286,6 @@ class WeightedSums(Sums):
     """A window of running sums of opaque 8-bit frames that are weighted pixel by pixel, as layers are exposed
     (core.pixels.layering), and of their weights, in textures rgba32ui: four fields of 32 bits. Where the weights are 1,
     its pictures have the bits of Sums."""
-
-    _loading = (*Sums._loading, ("weights", "r32f"))
 
     def __init__(self, device: Device, source: WeightedFrames, capacity: int, shutters: int = 1) -> None:
         self.cover, self._weight = 2 if source.rest else 1, source.weight

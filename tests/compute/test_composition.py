@@ -80,7 +80,7 @@ def composed(device, source, moment, index, direction=1, shot=None, mattes=None)
     moves = moment.following and moment.following.at(indices)
     expected = compositor.compose(moment, source.linear()[np.maximum(indices, 0)], indices >= 0, c, moves)
     assert picture.shape == expected.shape
-    renderer.release_window()
+    renderer.release()
     return picture, expected
 
 

@@ -2,15 +2,16 @@
 
 import threading
 from collections.abc import Callable
-from functools import cache, partial
+from functools import cache
 from typing import NamedTuple
 
 import bpy
 import gpu
 from bpy.app.translations import pgettext_rpt as rpt_
 
+from ...compute.cpu import CPUCompositor
 from ...compute.gpu import GPUCompositor
-from ...compute.renderer import open_compositor, open_gl
+from ...compute.renderer import open_gl
 from ...compute.request import Compositor
 from ...core import threads
 from ...devices.device import NoDeviceError
@@ -20,10 +21,10 @@ from .main_thread import RelayedDevice
 CHOICES = ("auto", "gpu", "opengl", "blender", "cpu")  # gpu: opengl, else blender
 # What opens each device. Arguments: a Budget and `ask_others`, as for Device.
 OPEN: dict[str, Callable[..., Compositor]] = {
-    "opengl": partial(open_compositor, "gpu"),
+    "opengl": lambda *memory: GPUCompositor(open_gl(*memory)),
     "blender": lambda *memory: GPUCompositor(BlenderDevice(*memory)),
     "relayed": lambda *memory: GPUCompositor(RelayedDevice(*memory)),  # Blender's GPU, from the thread of a job
-    "cpu": partial(open_compositor, "cpu"),
+    "cpu": lambda *_memory: CPUCompositor(),
 }
 
 

@@ -133,7 +133,8 @@ class BlenderDevice(Device):
         for top in range(0, height, rows):
             strip = array[top : top + rows]
             sent = (width, len(strip)), sent_format, _buffer("FLOAT", _packed(strip, packing))
-            self._send(texture.gpu, unpacking(texture.kind, packing), sent, top, layer)
+            unpacking = read_pass("blender_gpu", "UNPACK", PACKING=packing, FORMAT=texture.kind)
+            self._send(texture.gpu, unpacking, sent, top, layer)
 
     def send(self, texture: Texture, frame: np.ndarray) -> Texture:
         """See Device. The numbers need no unpacking."""
@@ -227,10 +228,6 @@ def _trial() -> list[str]:
     given = dict(pairwise(sys.argv)).get("--gpu-backend", bpy.context.preferences.system.gpu_backend.lower())
     options = ["--background", "--factory-startup", "--gpu-backend", given, "--python-exit-code", "1"]
     return [bpy.app.binary_path, *options, "--python-expr", "import gpu; gpu.init()"]
-
-
-def unpacking(kind: str, packing: int) -> Pass:
-    return read_pass("blender_gpu", "UNPACK", PACKING=packing, FORMAT=kind)
 
 
 def _exchanged(texture: Texture) -> tuple:

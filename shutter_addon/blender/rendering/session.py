@@ -41,12 +41,10 @@ class Work(NamedTuple):
     Attributes:
         future: Its result.
         ended: Set, it ends before its next step.
-        relayed: Whether the main thread has its GPU.
     """
 
     future: Future
     ended: threading.Event
-    relayed: bool
 
     def break_off(self) -> None:
         self.ended.set()
@@ -55,22 +53,22 @@ class Work(NamedTuple):
     def result(self) -> Any:
         """Return the result as result_of; break the work off where it is no longer wanted."""
         try:
-            return result_of(self.future, self.relayed)
+            return result_of(self.future)
         except StoppedError:
             self.break_off()
             raise
 
 
-def result_of(future: Future[T], relayed: bool) -> T:
+def result_of(future: Future[T]) -> T:
     """Wait for a future's result.
 
     Raises:
         StoppedError: It is no longer wanted (stopping.once).
-        NoDeviceError: Blender's GPU is not current, so waiting would never end.
+        NoDeviceError: It waits for Blender's GPU, which is not current, so waiting would never end.
     """
     is_window = where() is Where.WINDOW
     while not wait([future], 0 if is_window else _PATIENCE).done:
-        if is_window and not main_thread.serve() and relayed:
+        if is_window and not main_thread.serve():
             require_context()
         stopping.check()
     return future.result()
@@ -155,10 +153,10 @@ class RenderSession:
                 self._executor = threads.pool(1)
             with suppress(RuntimeError):  # at Python's exit, threads take no more work
                 future = self._executor.submit(broken_off, ended.is_set, function, *arguments)
-                return Work(future, ended, self.device == "relayed")
+                return Work(future, ended)
         done: Future = Future()
         done.set_result(function(*arguments))
-        return Work(done, ended, False)
+        return Work(done, ended)
 
     def request(
         self, snapshot: Snapshot, frame: float, context: RenderContext, detail: Detail | None = None
@@ -257,7 +255,7 @@ class RenderSession:
             if self._chosen and (message := self._chosen[1]):
                 say(message)
         try:
-            return result_of(self._compositor, self.device == "relayed")
+            return result_of(self._compositor)
         except NoDeviceError:
             self._compositor = None
             raise
