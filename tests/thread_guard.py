@@ -33,7 +33,6 @@ REVIEWED: dict[str, set[str]] = {
         "BlenderDevice.send",
         "BlenderDevice.write",
         "_buffer",
-        "_exchanged",
         "_packed",
     },
     "devices/main_thread.py": {

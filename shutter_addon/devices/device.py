@@ -201,7 +201,7 @@ class Device:
             opaque: every alpha is full, so the device may send only the colors
 
         Raises:
-            TypeError: only passes write and read this format (rgba16ui and rgba32ui on Blender's GPU)
+            KeyError: only passes write and read this format (rgba16ui and rgba32ui on Blender's GPU)
         """
         raise NotImplementedError
 
@@ -219,7 +219,7 @@ class Device:
         """Return a copy (layers, height, width, components) in the format's type, after all passes so far.
 
         Raises:
-            TypeError: as for `write`
+            KeyError: as for `write`
         """
         raise NotImplementedError
 

@@ -28,7 +28,7 @@ TYPES = {"sampler2DArray": "FLOAT_2D_ARRAY", "usampler2DArray": "UINT_2D_ARRAY"}
 _AS_IT_IS, _WHOLE, _OPAQUE_BYTES, _PAIRS_OF_BYTES, _SIXTEEN_BITS = range(5)
 # GLSL format: NumPy's type, the format that is sent, how it is unpacked (UNPACK). Only passes use rgba16ui and
 # rgba32ui: floats cannot hold them, and Blender reads whole numbers only of one component.
-FORMATS = {
+FORMATS: dict[str, tuple] = {
     "rgba8": (np.uint8, "RG32F", _PAIRS_OF_BYTES),
     "rgba16": (np.uint16, "RGBA32F", _SIXTEEN_BITS),
     "rgba16f": (np.float16, "RGBA32F", _AS_IT_IS),
@@ -116,17 +116,14 @@ class BlenderDevice(Device):
         self.run(LETTING_GO, (1, 1), textures=spares, images=spares, layer=0)
 
     def _make(self, width: int, height: int, layers: int, kind: str) -> gpu.types.GPUTexture:
-        try:
-            return gpu.types.GPUTexture((width, height), layers=layers, format=kind.upper())
-        except RuntimeError as error:
-            raise NoDeviceError(str(error)) from None
+        return _new((width, height), kind.upper(), layers=layers)
 
     def _free(self, own: gpu.types.GPUTexture) -> None:
         free(own)
 
     def write(self, texture: Texture, array: np.ndarray, layer: int = 0, *, opaque: bool = False) -> None:
         height, width = array.shape[:2]
-        _, sent_format, packing = _exchanged(texture)
+        _, sent_format, packing = FORMATS[texture.kind]
         if texture.kind == "rgba8" and opaque:
             sent_format, packing = "R32F", _OPAQUE_BYTES
         rows = max(1, _SENT_BYTES // (width * texel_bytes(sent_format.lower())))
@@ -142,18 +139,18 @@ class BlenderDevice(Device):
         if width * height * texel_bytes("r32f") > _SENT_BYTES:
             return super().send(texture, frame)
         data = _buffer("FLOAT", _packed(frame, _OPAQUE_BYTES))
-        return Texture(None, (width, height, 1), "r32f", _of_numbers((width, height), "R32F", data))
+        return Texture(None, (width, height, 1), "r32f", _new((width, height), "R32F", data))
 
     def _send(self, stored: gpu.types.GPUTexture, program: Pass, sent: tuple, top: int, layer: int) -> None:
-        """Send numbers and unpack them into a layer. sent: arguments of _of_numbers."""
-        textures, size = {"sent": _of_numbers(*sent)}, sent[0]
+        """Send numbers and unpack them into a layer. sent: arguments of _new."""
+        textures, size = {"sent": _new(*sent)}, sent[0]
         constants = {"size": size, "top": top, "layer": layer}
         BlenderDevice._dispatch(self, program, program.groups(size), textures, {"stored": stored}, {}, constants)
 
     def read(self, texture: Texture) -> np.ndarray:
         """See Device."""
         width, height, layers = texture.size
-        dtype, _, packing = _exchanged(texture)
+        dtype, _, packing = FORMATS[texture.kind]
         components = 4 if texture.kind.startswith("rgba") else 1
         sample, kind = (np.uint32, "UINT") if packing == _WHOLE else (np.float32, "FLOAT")
         array = np.empty((layers, height, width, components), sample)
@@ -230,21 +227,12 @@ def _trial() -> list[str]:
     return [bpy.app.binary_path, *options, "--python-expr", "import gpu; gpu.init()"]
 
 
-def _exchanged(texture: Texture) -> tuple:
-    """Return the texture's entry of FORMATS.
-
-    Raises:
-        TypeError: Blender neither sends nor reads such a texture. It would read nothing, without an error.
-    """
-    if texture.kind not in FORMATS:
-        raise TypeError(f"on Blender's GPU only passes read and write textures of {texture.kind}")
-    return FORMATS[texture.kind]
-
-
-def _of_numbers(size: tuple[int, int], kind: str, data: gpu.types.Buffer) -> gpu.types.GPUTexture:
-    """Return a texture of numbers. Raise NoDeviceError if the GPU has no room for it."""
+def _new(
+    size: tuple[int, int], kind: str, data: gpu.types.Buffer | None = None, layers: int = 1
+) -> gpu.types.GPUTexture:
+    """Return a texture, filled with numbers. Raise NoDeviceError if the GPU has no room for it."""
     try:
-        return gpu.types.GPUTexture(size, layers=1, format=kind, data=data)
+        return gpu.types.GPUTexture(size, layers=layers, format=kind, data=data)
     except RuntimeError as error:
         raise NoDeviceError(str(error)) from None
 

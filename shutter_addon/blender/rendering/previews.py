@@ -261,8 +261,7 @@ def _drafted(context: Context, shown: Shown, request: Request) -> Request:
 
 
 def draft(request: Request, source: FrameSource) -> Request:
-    """Return the request as a draft: where shutters follow edges, in blocks, DRAFT_ROWS at most along the shorter side.
-    Return the request as a draft: where shutters follow edges, in blocks, DRAFT_ROWS at most along the shorter side."""
+    """Return the request as a draft: where shutters follow edges, in blocks, DRAFT_ROWS at most along a side."""
     options = request.state.options
     if not options.edge_aware:
         return request
