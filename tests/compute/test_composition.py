@@ -218,21 +218,6 @@ def test_a_picture_stays_on_the_device(gpu_device):
     assert np.array_equal(pixels, other.picture(Request(3, moment)))
 
 
-@pytest.mark.parametrize("shapes", [SHAPES, SHAPES[:1], ()])
-@pytest.mark.parametrize("block", [1, 2])
-def test_coefficients_stay_on_the_device(gpu_device, shapes, block):
-    rng = np.random.default_rng(19)
-    source, moment = footage(rng), state(rng, shapes=shapes, count=6, aggregate=block)
-    renderer = Renderer(GPUCompositor(gpu_device), source)
-    texture, size = renderer.drawn_coefficients(Request(0, moment))
-    with gpu_device.current():
-        layers = gpu_device.read(texture)
-    values = np.moveaxis(layers, -1, 1).reshape(-1, *layers.shape[1:3])[:6]
-    y, x = np.mgrid[: source.height, : source.width]
-    expected = renderer.coefficients(Request(0, moment))[:, y // block, x // block]
-    assert np.array_equal(values[:, y // size, x // size], expected)
-
-
 def test_no_new_solve_when_nothing_moved(device, monkeypatch):
     rng = np.random.default_rng(13)
     solves = []

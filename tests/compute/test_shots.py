@@ -179,25 +179,6 @@ def test_what_is_missing_is_what_is_read(device, edges, position, edge_aware):
         renderer.release()
 
 
-def test_a_frame_that_cannot_be_read_is_missed_only_where_it_is_shown(device):
-    from shutter_addon.media import MediaError
-
-    source = film()
-    read = source.read
-
-    def fail(index):
-        if index == 5:
-            raise MediaError("broken")
-        return read(index)
-
-    source.read = fail
-    last = FrameState(Options(5), np.eye(5)[4:])
-    renderer = Renderer(device, ShotSource(source))
-    renderer.picture(Request(2, last))
-    with pytest.raises(MediaError, match="broken"):
-        renderer.picture(Request(1, last))
-
-
 @pytest.mark.parametrize(("edges", "brightness"), [("hold", 1.0), ("mirror", 0.25), ("shorten", 1.0), ("slide", 0.25)])
 def test_moments_show_nothing_of_the_next_shot(device, edges, brightness):
     """Whatever that is: a smooth exposure ends with the last filmed frame of its own."""
