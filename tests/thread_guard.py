@@ -52,8 +52,9 @@ REVIEWED: dict[str, set[str]] = {
     "editing/track_region.py": {"_each", "track.<lambda>"},
     "rendering/outline_carrying.py": {"_Carrying._carry"},
     "rendering/effect_source.py": {"_options", "find_steps", "find_steps.find", "steps_key"},
+    "rendering/pictures.py": {"_weights"},
     "rendering/render_job.py": {"where"},
-    "rendering/session.py": {"RenderSession._ask", "RenderSession.forget.<lambda>", "_weights", "broken_off"},
+    "rendering/session.py": {"RenderSession._ask", "RenderSession.forget.<lambda>", "broken_off"},
     "rendering/sessions.py": {"_ask_window"},
     "rendering/strobing.py": {"_measure_motion"},
 }

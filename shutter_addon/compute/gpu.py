@@ -147,57 +147,6 @@ def _bits(coefficients: Coefficients) -> int:
     return (coefficients.block - 1).bit_length()
 
 
-class Displaying:
-    """Makes a display's levels of pictures on a device."""
-
-    def __init__(self, device: Device) -> None:
-        self._device = device
-        self._textures = NamedTextures(device)
-        self._sent: Memo[tuple[dict[str, Texture], float]] = Memo()
-
-    def levels(self, picture: Texture, display: Display) -> np.ndarray:
-        """Return the levels (H, W, 4) uint8 of an opaque picture of GPUCompositor.draw, top row first."""
-        width, height, _ = picture.size
-        noise, levels = display.noise(width, height), self._textures.of("levels", (width, height, 1), "rgba8")
-        images = {"picture": picture, "levels": levels}
-        own, slope = self._sent.get((display, width, height), lambda: self._send(display, noise))
-        images |= own
-        self._device.run(SHOW, (width, height), images=images, size=(width, height), slope=slope)
-        made = self._device.read(levels)[0]
-        whole = made.view("<u4")  # alpha is in the highest bits
-        unsure = np.flatnonzero(whole < 1 << 24)
-        rows, columns = np.divmod(unsure, width)
-        rows = height - 1 - rows  # pictures have the bottom row first
-        if unsure.size:
-            light = self._picked(picture, rows * width + columns)
-            found = np.full((unsure.size, 4), 255, np.uint8)
-            found[:, :3] = display.levels(light, noise[rows, columns])
-            whole.reshape(-1)[unsure] = found.view("<u4")[:, 0]
-        return made
-
-    def _picked(self, picture: Texture, places: np.ndarray) -> np.ndarray:
-        """Return the light (n, 3) of pixels, given by their numbers."""
-        size = _COLUMNS, -(-len(places) // _COLUMNS)
-        numbers = np.zeros((size[1], _COLUMNS), np.uint32)
-        numbers.ravel()[: len(places)] = places
-        sent = self._textures.filled("places", [numbers], "r32ui")
-        picked = self._textures.of("picked", (*size, 1))
-        images = {"picture": picture, "places": sent, "picked": picked}
-        self._device.run(PICK, size, images=images, size=size, width=picture.size[0])
-        return self._device.read(picked)[0].reshape(-1, 4)[: len(places), :3]
-
-    def _send(self, display: Display, noise: np.ndarray) -> tuple[dict[str, Texture], float]:
-        """Return the textures of the noise and of the curve, and OpenColorIO's slope below it, which is not 12.92."""
-        slope = 255 * float(display.transfer(np.array([2.0**_LOWEST], np.float32))[0]) / 2.0**_LOWEST
-        grain = self._textures.filled("grain", [noise], "r32f")
-        return {"grain": grain, "curve": self._textures.filled("curve", [_curve(display)])}, slope
-
-    def release(self) -> None:
-        """Free all memory on the device. Call it inside Device.freeing."""
-        self._textures.release()
-        self._sent.clear()
-
-
 def _curve(display: Display) -> np.ndarray:
     """Return the pieces (1, n, 4) float32 of the curve for shaders/display.glsl."""
     starts = np.arange(_FIRST, _FIRST + _PIECES, dtype=np.uint32) << np.uint32(_SHIFT)
@@ -217,7 +166,7 @@ class GPUCompositor:
         self.device, self.name, self.takes_planes = device, device.name, device.takes_planes
         self.current, self.freeing = device.current, device.freeing
         self._textures = NamedTextures(device)
-        self._displaying = Displaying(device)
+        self._displayed: Memo[tuple[dict[str, Texture], float]] = Memo()
 
     def window(
         self, source: FrameSource, capacity: int, moved: bool = False, shutters: int = 4, summed: bool = True
@@ -246,7 +195,41 @@ class GPUCompositor:
         return self.device.read(texture)[0]
 
     def shown(self, drawn: Texture, display: Display) -> np.ndarray:
-        return self._displaying.levels(drawn, display)
+        """See request.Compositor."""
+        width, height, _ = drawn.size
+        noise, levels = display.noise(width, height), self._textures.of("levels", (width, height, 1), "rgba8")
+        images = {"picture": drawn, "levels": levels}
+        own, slope = self._displayed.get((display, width, height), lambda: self._send(display, noise))
+        images |= own
+        self.device.run(SHOW, (width, height), images=images, size=(width, height), slope=slope)
+        made = self.device.read(levels)[0]
+        whole = made.view("<u4")  # alpha is in the highest bits
+        unsure = np.flatnonzero(whole < 1 << 24)
+        rows, columns = np.divmod(unsure, width)
+        rows = height - 1 - rows  # pictures have the bottom row first
+        if unsure.size:
+            light = self._picked(drawn, rows * width + columns)
+            found = np.full((unsure.size, 4), 255, np.uint8)
+            found[:, :3] = display.levels(light, noise[rows, columns])
+            whole.reshape(-1)[unsure] = found.view("<u4")[:, 0]
+        return made
+
+    def _picked(self, picture: Texture, places: np.ndarray) -> np.ndarray:
+        """Return the light (n, 3) of pixels, given by their numbers."""
+        size = _COLUMNS, -(-len(places) // _COLUMNS)
+        numbers = np.zeros((size[1], _COLUMNS), np.uint32)
+        numbers.ravel()[: len(places)] = places
+        sent = self._textures.filled("places", [numbers], "r32ui")
+        picked = self._textures.of("picked", (*size, 1))
+        images = {"picture": picture, "places": sent, "picked": picked}
+        self.device.run(PICK, size, images=images, size=size, width=picture.size[0])
+        return self.device.read(picked)[0].reshape(-1, 4)[: len(places), :3]
+
+    def _send(self, display: Display, noise: np.ndarray) -> tuple[dict[str, Texture], float]:
+        """Return the textures of the noise and of the curve, and OpenColorIO's slope below it, which is not 12.92."""
+        slope = 255 * float(display.transfer(np.array([2.0**_LOWEST], np.float32))[0]) / 2.0**_LOWEST
+        grain = self._textures.filled("grain", [noise], "r32f")
+        return {"grain": grain, "curve": self._textures.filled("curve", [_curve(display)])}, slope
 
     def draw(self, window: Handle, request: Request, coefficients: Coefficients) -> Texture:
         """Return the picture on the device, premultiplied: a texture array with one layer.
@@ -374,5 +357,4 @@ class GPUCompositor:
     def release(self) -> None:
         with self.device.freeing():
             self._textures.release()
-            self._displaying.release()
         self.device.release()

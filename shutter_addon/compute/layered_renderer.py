@@ -13,6 +13,7 @@ from ..core.model.mattes import MatteReader
 from ..core.model.windows import source_frames
 from ..core.pixels import layering
 from . import plates, window_frames
+from .guide import Guides, NotedSource
 from .layer_frames import LayerMattes, RecentFrames, WeightedFrames
 from .request import Behind, Coefficients, Compositor, Exposure, Handle, Request, Stages
 from .window import summable
@@ -30,7 +31,7 @@ class LayeredRenderer:
         compositor: composes the parts
         stages: lays them over one another
         source: the footage
-        noted: returns a source whose frames are noted for the guides of the diffusion
+        guides: note its frames for the diffusion
         mattes: reads the values of mattes
         solve: returns coefficients (N, h, w) float32 of a state (Layers.scribbles) at a frame of a source
     """
@@ -40,16 +41,16 @@ class LayeredRenderer:
         compositor: Compositor,
         stages: Stages,
         source: FrameSource,
-        noted: Callable[[FrameSource], FrameSource],
+        guides: Guides,
         mattes: MatteReader | None,
         solve: Callable[[FrameSource, FrameState, int], np.ndarray],
     ) -> None:
         self._compositor, self._stages, self._source = compositor, stages, source
         self.recent = RecentFrames(source)
-        self._noted = noted(self.recent)
+        noted = NotedSource(self.recent, guides)
         size = source.width, source.height
         self.mattes = LayerMattes(size, lambda state, frame: solve(self.recent, state, frame), mattes)
-        self._colors = plates.LayerColors(self._noted, self.recent, self.mattes)
+        self._colors = plates.LayerColors(noted, self.recent, self.mattes)
         self._layers: Layers | None = None
         self._windows: dict[tuple, Handle] = {}
         self._loaded: dict[tuple[int, int], tuple] = {}  # of `_keys`, for the frames in the windows

@@ -137,7 +137,7 @@ class Renderer:
                 self.compositor,
                 self._stages,
                 self.source,
-                lambda source: guide.NotedSource(source, self._guides),
+                self._guides,
                 self._mattes and self._mattes.another(),
                 self._solved_apart,
             )

@@ -77,7 +77,7 @@ def end_job() -> None:
     """Drop what a window's job has begun, and snapshots. A script's next still may go on from the last one."""
     if render_job.where() is Where.JOB:
         OFFSCREEN.rest()
-    OFFSCREEN.forget_requests()
+    OFFSCREEN.requests.clear()
 
 
 def drop_removed() -> None:
