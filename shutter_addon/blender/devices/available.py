@@ -53,7 +53,9 @@ def choose(wanted: str, *, window_waits: bool = False) -> tuple[str, str | None]
             lacking.append(
                 rpt_("View > Render Sequencer Animation cannot use Blender's own GPU, as Render > Render Animation can")
             )
-        elif not bpy.app.background or _blender_in_background():
+        elif not bpy.app.background or (
+            threading.current_thread() is threading.main_thread() and opens_in_background()
+        ):
             way = "blender" if bpy.app.background else "relayed"
             return way, f"{lacking[0]}; composing on Blender's own GPU, {name(way)}" if wanted == "auto" else None
         else:
@@ -91,7 +93,3 @@ def _tried() -> OpenGL:
         return OpenGL(lacking=str(error))
     device.release()
     return OpenGL(device.name, device.budget.limit)
-
-
-def _blender_in_background() -> bool:
-    return threading.current_thread() is threading.main_thread() and opens_in_background()

@@ -20,7 +20,7 @@ import gpu
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...devices.device import Budget, Device, NoDeviceError, Texture, machine_memory, texel_bytes
+from ...devices.device import Budget, Device, NoDeviceError, Texture, allowed, machine_memory, texel_bytes
 from ...devices.llvmpipe import is_llvmpipe
 from ...devices.passes import Pass, read_pass
 
@@ -81,13 +81,13 @@ class BlenderDevice(Device):
     """
 
     def __init__(self, budget: Budget | None = None, ask_others: Callable[[], None] | None = None) -> None:
-        super().__init__(budget, ask_others)
+        self.name = gpu.platform.renderer_get()
+        memory = machine_memory() if is_llvmpipe(self.name) else None
+        super().__init__(budget or Budget(allowed(memory)), ask_others)
         self._shaders: dict[Pass, gpu.types.GPUShader] = {}
         self._spare: Texture | None = None
-        self.name = gpu.platform.renderer_get()
         self.max_layers = gpu.capabilities.max_texture_layers_get()
         self.max_size = gpu.capabilities.max_texture_size_get()
-        self.budget.tell(machine_memory() if is_llvmpipe(self.name) else None)
 
     def current(self) -> AbstractContextManager[BlenderDevice]:
         """See Device."""

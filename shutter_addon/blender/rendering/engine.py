@@ -1,6 +1,7 @@
 """The render engine of effect scenes, which Blender's sequencer calls for every frame of an effect strip."""
 
 import inspect
+from dataclasses import replace
 
 import bpy
 import mathutils
@@ -56,9 +57,9 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
             with stopping.once(stopped or self._stopped):
                 picture = pictures.picture(context, shown, frame, detail)
         except StoppedError:
-            if stopped is None:
+            if asked is None or stopped is None:
                 raise
-            previews.engine_stopped()
+            previews.looking.decision = replace(asked, is_late=True)
             invalidation.keep_until_drawn(scene.session_uid)
             return
         picture = pictures.resized(picture, width, height, detail.divisor)

@@ -132,12 +132,6 @@ def for_engine(context: Context, effect_scene: Scene) -> Decision | None:
     return Decision(snapshot, frame, _best(context, sessions.of_drawing(), snapshot, frame, detail))
 
 
-def engine_stopped() -> None:
-    """Note that the engine's picture was not finished in time."""
-    assert looking.decision is not None
-    looking.decision = replace(looking.decision, is_late=True)
-
-
 def take_decision() -> Decision | None:
     """Return the engine's decision for this redraw; None: Blender had the picture already."""
     decision, looking.decision = looking.decision, None
@@ -290,11 +284,6 @@ def _time_up(context: Context, key: tuple) -> Slice:
 def was_drawn() -> None:
     """Note that a picture is finished."""
     looking.slices.end()
-
-
-def is_composing() -> bool:
-    """Tell whether a first or a better picture is being made."""
-    return looking.slices.last is not None or smooth_previews.is_busy()
 
 
 def refine() -> None:

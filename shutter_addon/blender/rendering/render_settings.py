@@ -6,7 +6,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...devices.device import MEGABYTE, Budget
+from ...devices.device import MEGABYTE, Budget, allowed
 from ..data import preferences
 from ..data.property_copy import for_a_while
 from ..devices import available
@@ -58,12 +58,12 @@ def _wanted_memory() -> int:
 def memory() -> Budget:
     """Return the budget of GPU memory that all sessions share.
 
-    OpenGL knows the size best, where it may be asked; otherwise the first device tells.
+    OpenGL knows the size best, where it may be asked.
     """
     if _settings.budget is None:
         megabytes = _wanted_memory()
-        asks = not megabytes and wanted() in ("auto", "gpu", "opengl")
-        _settings.budget = megabytes, Budget(megabytes * MEGABYTE or (available.opengl().memory if asks else None))
+        known = available.opengl().memory if not megabytes and wanted() in ("auto", "gpu", "opengl") else None
+        _settings.budget = megabytes, Budget(megabytes * MEGABYTE or known or allowed(None))
     return _settings.budget[1]
 
 
