@@ -91,10 +91,8 @@ def filled_rows(rows: int) -> float:
 
 def padded(values: np.ndarray) -> np.ndarray:
     """Return values (…, N) as (…, G, 4): four shutters to a texel, zeros after the last."""
-    groups = -(-values.shape[-1] // 4)
-    result = np.zeros((*values.shape[:-1], groups * 4))
-    result[..., : values.shape[-1]] = values
-    return result.reshape(*values.shape[:-1], groups, 4)
+    whole = np.pad(values, [(0, 0)] * (values.ndim - 1) + [(0, -values.shape[-1] % 4)])
+    return whole.reshape(*values.shape[:-1], -1, 4)
 
 
 def table(state: FrameState) -> np.ndarray:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from shutter_addon.compute import cpu, running_sums, window
+from shutter_addon.compute import cpu, window
 from shutter_addon.compute.cpu import CPUCompositor
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer, open_compositor
@@ -14,6 +14,7 @@ from shutter_addon.core.model import shutters, windows
 from shutter_addon.core.model.frame_state import FrameState, Options
 from shutter_addon.core.model.scribbles import Shape
 from shutter_addon.core.pixels import compositor
+from shutter_addon.devices import llvmpipe
 
 LEVEL = 1 / 255
 
@@ -238,7 +239,7 @@ def test_no_new_solve_when_nothing_moved(device, monkeypatch):
 @pytest.mark.parametrize("size", [(37, 23), (1, 1), (70, 33)])
 def test_sums_lie_in_tiles_only_where_textures_are_rows(monkeypatch, rows, size):
     """And pictures are right both ways, in bands as well: software renderers have the tiles, GPUs have not."""
-    monkeypatch.setattr(running_sums, "stores_rows", lambda device: rows)
+    monkeypatch.setattr(llvmpipe, "is_llvmpipe", lambda name: rows)
     monkeypatch.setattr(window, "BAND_BYTES", size[0] * 8 * 17 * 32)
     rng = np.random.default_rng(20)
     device, source = open_compositor("gpu"), footage(rng, size=size)
@@ -255,7 +256,7 @@ def test_sums_lie_in_tiles_only_where_textures_are_rows(monkeypatch, rows, size)
 
 
 def test_a_window_too_long_or_a_picture_too_high_for_tiles_has_none(monkeypatch):
-    monkeypatch.setattr(running_sums, "stores_rows", lambda device: True)
+    monkeypatch.setattr(llvmpipe, "is_llvmpipe", lambda name: True)
     device, source = open_compositor("gpu"), footage(np.random.default_rng(21), count=3, size=(37, 65))
     rows_of_tiles = -(-source.height // 16)
     with device.current():

@@ -128,7 +128,7 @@ def _draw() -> None:
         _show_sharp(context, preview_areas.shown(context, space.display_channel))
     # Our picture would cover the stroke under the pen; Blender's own picture shows the same.
     if previews.pen_is_down():
-        previews.was_drawn()
+        previews.looking.slices.end()
         previews.refine()
         return
     say = _Notes(context.region)
@@ -141,7 +141,7 @@ def _draw() -> None:
             _show(context, shown, decision, say)
         else:
             previews.looking.whole = None
-            previews.was_drawn()
+            previews.looking.slices.end()
             _tell_unseen(context, say)
         try:
             previews.refine()
@@ -173,7 +173,7 @@ def _show(context: Context, shown: Shown, decision: Decision | None, say: "_Note
             _show_strokes(context, quad, shown, wanted.decision.snapshot)
             main_thread.later(preview_areas.redraw)
     except effect_source.FAULTS as error:
-        previews.was_drawn()
+        previews.looking.slices.end()
         _tell_fault(error, say)
 
 
@@ -206,7 +206,7 @@ def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, s
         if settings.view == "EDGES":
             _show_coefficients(quad, colors, renderer, request, "EDGES", 1.0)
         _show_strokes(context, quad, shown, wanted.decision.snapshot)
-    previews.was_drawn()
+    previews.looking.slices.end()
     _tell_carrying(say)
     for sentence in pictures.shortages(renderer, wanted.decision.snapshot, request):
         say(sentence)

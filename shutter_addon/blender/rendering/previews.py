@@ -151,7 +151,9 @@ def for_drawing(context: Context, shown: Shown, decision: Decision | None) -> Dr
     request = _drafted(context, shown, decision.request)
     has_result = settings.view in RESULTS
     left = settings.split if settings.view == "SPLIT" else 0.0 if has_result else 1.0
-    if is_tracking():  # in the sharp source, the user sees whether a stroke stays on its subject
+    if (
+        _TRACKING & render_job.operators_running()
+    ):  # in the sharp source, the user sees whether a stroke stays on its subject
         left = 1.0
     # Otherwise Blender shows the engine's picture among the other strips.
     draws_result = has_result and left < 1 and (decision.is_drawn or not _is_rendered(shown))
@@ -281,11 +283,6 @@ def _time_up(context: Context, key: tuple) -> Slice:
     return looking.slices.next(key, _SLICE / 2, _SLICE)  # the playhead and a note move after the first slice
 
 
-def was_drawn() -> None:
-    """Note that a picture is finished."""
-    looking.slices.end()
-
-
 def refine() -> None:
     """Go on with the smooth pictures behind those drawn. One of effect_source.FAULTS: there is none."""
     if pen_is_down():
@@ -306,11 +303,6 @@ def _is_playing(context: Context) -> bool:
 def pen_is_down() -> bool:
     """Tell whether a stroke is being drawn or erased."""
     return _PEN in render_job.operators_running()
-
-
-def is_tracking() -> bool:
-    """Tell whether a tracking operator runs."""
-    return bool(_TRACKING & render_job.operators_running())
 
 
 def may_be_late() -> bool:
