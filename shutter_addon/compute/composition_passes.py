@@ -155,8 +155,7 @@ def moved_tables(state: FrameState, frames: np.ndarray) -> tuple[np.ndarray, np.
     Returns:
         The table, and the moves (L · motions, 1 + N, 4) float32; by value (L · motions, 2, 4)
     """
-    if state.following is None:
-        raise ValueError("nothing is followed")
+    assert state.following is not None
     turns, shifts = state.following.at(frames)
     numbers = np.stack([turns.real - 1, turns.imag, shifts.real, shifts.imag], axis=1)  # (L, 4, N)
     values = table(state)

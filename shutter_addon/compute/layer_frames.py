@@ -171,9 +171,8 @@ class LayerMattes:
         return layering.behind(self.of(layers, frame))
 
     def _read(self, matte: Matte, frame: int) -> np.ndarray:
-        if self._reader is None:
-            raise ValueError("there is no reader of mattes")
         reader = self._reader
+        assert reader is not None
         moves = frame if isinstance(matte.content, FileFrame) else None
         key = matte.content, matte.feather, matte.invert, moves
         return self._get(key, lambda: reader.values((matte,), frame, 1)[0][1])

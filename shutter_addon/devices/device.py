@@ -267,8 +267,7 @@ class Device:
         wanted = tuple(texture for texture in textures if texture.device is self)
         for texture in wanted:
             if texture.own is None:
-                if texture.waiting is None:
-                    raise ValueError("the texture was released")
+                assert texture.waiting is not None, "the texture was released"
                 texture.own = self._made(texture, wanted)
                 for layer, values in enumerate(texture.waiting):
                     self.write(texture, values, layer)
