@@ -191,16 +191,11 @@ def test_blenders_gpu_solves_the_same(scene, on_moderngl, on_blender):
     np.testing.assert_allclose(on_blender(labels, count), on_moderngl(labels, count), rtol=0, atol=LEVEL / 100)
 
 
-@pytest.mark.parametrize(("pitch", "at", "size", "kept"), LATTICES)
-def test_dots_anywhere_are_exact(on_moderngl, pitch, at, size, kept):
-    labels, count = lattice(*pitch, at, 1, size=size, kept=kept)
-    np.testing.assert_allclose(on_moderngl(labels, count), exact(labels, count), rtol=0, atol=LEVEL)
-
-
-def test_a_large_lattice(on_moderngl):
-    """The larger the picture, the more grids lose what lies on their coarse cells."""
-    labels, count = lattice(8, 8, (0, 0), 2, 640, 360)
-    np.testing.assert_allclose(on_moderngl(labels, count), exact(labels, count), rtol=0, atol=LEVEL)
+def test_dots_anywhere_are_exact(on_moderngl):
+    """And in a large picture: the larger, the more grids lose what lies on their coarse cells."""
+    scenes = [lattice(*pitch, at, 1, size=size, kept=kept) for pitch, at, size, kept in LATTICES]
+    for labels, count in (*scenes, lattice(8, 8, (0, 0), 2, 640, 360)):
+        np.testing.assert_allclose(on_moderngl(labels, count), exact(labels, count), rtol=0, atol=LEVEL)
 
 
 @settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
