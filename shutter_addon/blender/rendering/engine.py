@@ -6,7 +6,7 @@ from dataclasses import replace
 import bpy
 import mathutils
 import numpy as np
-from bpy.types import Depsgraph, RenderEngine
+from bpy.types import Depsgraph
 
 from ...core import stopping
 from ...core.messages import signed
@@ -30,7 +30,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
         except BaseException as error:  # otherwise Blender prints it, and renders the frame without the effect
             invalidation.spoil(depsgraph.scene.session_uid)
             if not isinstance(error, StoppedError):
-                fail(self, effect_source.in_words(error))
+                self._fail(effect_source.in_words(error))
             elif not self.test_break():
                 render_job.cancel(self.test_break)
 
@@ -83,6 +83,14 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
             if render_pass.name == "Combined":  # one for each view of a stereo edit
                 render_pass.rect.foreach_set(values)
 
+    def _fail(self, sentence: str) -> None:
+        """Report why there is no picture, and end a render, which would write the frame without the effect."""
+        if render_job.ends_films():
+            render_job.fail(sentence)
+            render_job.cancel(self.test_break)
+        else:
+            self.report({"ERROR"}, signed(sentence))
+
     def _stopped(self) -> bool:
         return self.test_break() or render_job.stopping()
 
@@ -91,15 +99,6 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
             render_job.say(message)
         else:
             self.report({"WARNING"}, signed(message))
-
-
-def fail(engine: RenderEngine, sentence: str) -> None:
-    """Report why there is no picture, and end a render, which otherwise would write the frame without the effect."""
-    if render_job.ends_films():
-        render_job.fail(sentence)
-        render_job.cancel(engine.test_break)
-    else:
-        engine.report({"ERROR"}, signed(sentence))
 
 
 classes = (VirtualShutterEngine,)
