@@ -149,6 +149,5 @@ void at(ivec3 p) {
 #  endif
   store(place, next, added(sum_at(place, known), light));
 }
-
 #  include "pixels.glsl"
 #endif

@@ -2,11 +2,10 @@
 // invocation composes QUADS of four pixels above one another, which share each look-up in the table. A quad is a matrix
 // with a column for each pixel. EACH calls a function for every quad: a loop would move the arrays that it indexes to
 // memory. Software renderers run both sides of a branch, so costly code is in loops or behind macros.
-// coefficients: four shutters per layer. table: row 0 has the gains, the others knots or bars, four shutters per texel.
-// Frame k of the window is frame `origin` + k · `direction` of the shot's `count`. frames: source frame i is in layer
-// i mod `layers`. SUMS: running sums in their place, from position `lowest` on; the shot's ends are extended.
-// MOVED: shutters follow something (moved.glsl). COMBINE: frames are not averaged (combine.glsl). VALUE: value
-// interpolation. GROUPS of four shutters, TILED, EDGES, DECODE, PREMULTIPLIED, ENCODED: compute/composition_passes.py.
+// table: row 0 has the gains, the others knots or bars, four shutters per texel. Frame k of the window is frame `origin`
+// + k · `direction` of the shot's `count`. frames: source frame i is in layer i mod `layers`. SUMS: running sums instead,
+// from position `lowest` on. MOVED: moved.glsl. COMBINE: combine.glsl. VALUE: value interpolation. For other macros see
+// compute/composition_passes.py.
 layout(rgba32f) uniform readonly image2DArray table;
 uniform ivec2 size;
 uniform int top, block_bits;
