@@ -267,7 +267,8 @@ class Device:
         wanted = tuple(texture for texture in textures if texture.device is self)
         for texture in wanted:
             if texture.own is None:
-                assert texture.waiting is not None, "the texture was released"
+                if texture.waiting is None:
+                    raise ValueError("the texture was released")  # LayeredRenderer tries again
                 texture.own = self._made(texture, wanted)
                 for layer, values in enumerate(texture.waiting):
                     self.write(texture, values, layer)

@@ -133,13 +133,6 @@ def test_tiles(monkeypatch, tile, made, block):
         check(CPUCompositor(), footage(rng), made(rng, aggregate=block, exposure="weighted", **options), 12)
 
 
-@pytest.mark.parametrize("count", [8, 9])
-def test_number_of_shutters(device, count):
-    rng = np.random.default_rng(7)
-    shapes = tuple(Shape(i, "line", 0.05, (np.array([[i / count, 0.1], [i / count, 0.8]]),)) for i in range(count))
-    check(device, footage(rng, size=(64, 40)), state(rng, count=count, shapes=shapes), 0)
-
-
 def far_apart(rng, count, window, **options):
     """Shutters that open at one end of the window or at the other, scribbled closely."""
     shapes = [Shape(i, "line", 0.0, (np.array([[x, 0.05], [x, 0.95]]),)) for i, x in enumerate(rng.random(count))]

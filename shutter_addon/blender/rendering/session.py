@@ -226,9 +226,6 @@ class RenderSession:
                 self._submit(known[1].close)
             source = key.open(planes=compositor.takes_planes, keeps=self._late is None)
             known = key, Renderer(compositor, source, MatteValues.of(source, self._late))
-            other = key.scene, not key.place[1]
-            if other in self._renderers and not self._renderers[other][0].is_beside(key):
-                self._submit(self._renderers.pop(other)[1].close)
         self._renderers[key.place] = known
         while len({scene for scene, _ in list(self._renderers)}) > _KEPT:
             self._submit(self._renderers.pop(next(iter(self._renderers)))[1].close)
