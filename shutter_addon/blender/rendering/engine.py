@@ -30,7 +30,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
         except BaseException as error:  # otherwise Blender prints it, and renders the frame without the effect
             invalidation.spoil(depsgraph.scene.session_uid)
             if not isinstance(error, StoppedError):
-                self._fail(effect_source.in_words(error))
+                self.fail(effect_source.in_words(error))
             elif not self.test_break():
                 render_job.cancel(self.test_break)
 
@@ -83,7 +83,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
             if render_pass.name == "Combined":  # one for each view of a stereo edit
                 render_pass.rect.foreach_set(values)
 
-    def _fail(self, sentence: str) -> None:
+    def fail(self, sentence: str) -> None:
         """Report why there is no picture, and end a render, which would write the frame without the effect."""
         if render_job.ends_films():
             render_job.fail(sentence)
