@@ -76,7 +76,7 @@ class LayeredRenderer:
         """
         layers = request.state.layers
         assert layers is not None
-        parts = self._parts(layers, behind)
+        parts = self._parts(request, behind, layers)
         self._colors.begin(layers, behind.state.options, shot)
         self._forget_changed(layers)
         self._layers = layers
@@ -114,8 +114,8 @@ class LayeredRenderer:
         bottom = Behind(exposed[0], None if same else plain(), plate)
         return self._stages.lay(bottom, exposed[1:], request.levels)
 
-    def _parts(self, layers: Layers, behind: Request) -> Parts:
-        states = [behind.state, *(behind.state.of([shutter]) for shutter in layers.shutters)]
+    def _parts(self, request: Request, behind: Request, layers: Layers) -> Parts:
+        states = [behind.state, *(request.state.of([shutter]) for shutter in layers.shutters)]
         parts = {(i, False): replace(behind, state=state) for i, state in enumerate(states, -1)}
         if self._source.alpha != "opaque":
             for i, state in enumerate(states, -1):
