@@ -208,9 +208,11 @@ class LayerCase:
         self._compositor, self._source, self._state = compositor, source, state
         self._own, self._laying = state.of([shutter]), compositor.stages()
         window, shutters = state.options.window, len(state.bars)
-        behind = WeightedFrames(source, lambda index: 1 - self.matte(index), rest=True)
+        kind = {"alone": False, "colored": False}
+        behind = WeightedFrames(source, lambda index: 1 - self.matte(index), rest=True, **kind)
         self.windows = [
-            compositor.window(f, window, False, shutters) for f in (behind, WeightedFrames(source, self.matte))
+            compositor.window(f, window, False, shutters)
+            for f in (behind, WeightedFrames(source, self.matte, rest=False, **kind))
         ]
 
     @cache  # noqa: B019 – of a case, which goes with it

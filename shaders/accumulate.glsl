@@ -56,6 +56,16 @@ vec3 color_at(ivec2 pixel) {
   ivec3 rgb = light + ivec3(cr * red_of, cb * green_of.x + cr * green_of.y, cb * blue_of);
   return vec3(clamp(rgb, 0, (1 << 30) - 1) >> 22) / 255.0;
 }
+#elif !AGAIN && !MOMENT
+vec3 color_at(ivec2 pixel) {
+  vec4 sent = texelFetch(frame, ivec3(pixel, 0), 0);
+#  if NUMBERS
+  uint bytes = uint(sent.r);
+  return vec3(uvec3(bytes, bytes >> 8, bytes >> 16) & 255u) / 255.0;
+#  else
+  return sent.rgb;
+#  endif
+}
 #endif
 
 SUM added(SUM sum, SUM light) {
@@ -132,22 +142,12 @@ void main() {
 void at(ivec3 p) {
   ivec2 pixel = p.xy;
   ivec3 place = place_of_sums(pixel);
-  SUM sum = sum_at(place, known);
 #  if AGAIN
-  store(place, next, added(sum, minus(sum_at(place, after), sum_at(place, before))));
-#  elif PLANES
-  store(place, next, added(sum, light_of(decoded(color_at(pixel + ivec2(0, top))), pixel)));
+  SUM light = minus(sum_at(place, after), sum_at(place, before));
 #  else
-  vec4 sent = texelFetch(frame, ivec3(pixel + ivec2(0, top), 0), 0);
-#    if NUMBERS
-  uint bytes = uint(sent.r);
-  vec3 color = decoded(vec3(uvec3(bytes, bytes >> 8, bytes >> 16) & 255u) / 255.0);
-#    else
-  vec3 color = decoded(sent.rgb);
-#    endif
-  store(place, next, added(sum, light_of(color, pixel)));
+  SUM light = light_of(decoded(color_at(pixel + ivec2(0, top))), pixel);
 #  endif
+  store(place, next, added(sum_at(place, known), light));
 }
-
 #  include "pixels.glsl"
 #endif

@@ -53,5 +53,4 @@ void at(ivec3 p) {
   imageStore(levels, p, vec4(to_level(clamp(linear, 0.0, 1.0)), 1.0));
 }
 #endif
-
 #include "pixels.glsl"

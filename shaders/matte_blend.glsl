@@ -24,5 +24,4 @@ void at(ivec3 p) {
     imageStore(over, p, c);
   }
 }
-
 #include "pixels.glsl"

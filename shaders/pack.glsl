@@ -17,5 +17,4 @@ void at(ivec3 p) {
   uvec2 words = uvec2(packed_at(place), packed_at(place + ivec2(0, 1)));
   imageStore(packed_frames, ivec3(p.xy, layer), halves_of(words));
 }
-
 #include "pixels.glsl"

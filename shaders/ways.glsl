@@ -64,5 +64,4 @@ void at(ivec3 p) {
 #endif
 }
 #endif
-
 #include "pixels.glsl"

@@ -2,11 +2,10 @@
 // invocation composes QUADS of four pixels above one another, which share each look-up in the table. A quad is a matrix
 // with a column for each pixel. EACH calls a function for every quad: a loop would move the arrays that it indexes to
 // memory. Software renderers run both sides of a branch, so costly code is in loops or behind macros.
-// coefficients: four shutters per layer. table: row 0 has the gains, the others knots or bars, four shutters per texel.
-// Frame k of the window is frame `origin` + k · `direction` of the shot's `count`. frames: source frame i is in layer
-// i mod `layers`. SUMS: running sums in their place, from position `lowest` on; the shot's ends are extended.
-// MOVED: shutters follow something (moved.glsl). COMBINE: frames are not averaged (combine.glsl). VALUE: value
-// interpolation. GROUPS of four shutters, TILED, EDGES, DECODE, PREMULTIPLIED, ENCODED: compute/composition_passes.py.
+// table: row 0 has the gains, the others knots or bars, four shutters per texel. Frame k of the window is frame `origin`
+// + k · `direction` of the shot's `count`. frames: source frame i is in layer i mod `layers`. SUMS: running sums instead,
+// from position `lowest` on. MOVED: moved.glsl. COMBINE: combine.glsl. VALUE: value interpolation. For other macros see
+// compute/composition_passes.py.
 layout(rgba32f) uniform readonly image2DArray table;
 uniform ivec2 size;
 uniform int top, block_bits;
@@ -44,9 +43,6 @@ layout(rgba32f) uniform writeonly image2DArray picture;
 #endif
 
 ivec2 corner;
-#if TILED
-ivec3 corner_place;  // where the corner's sums begin
-#endif
 mat4 c[QUADS * GROUPS];
 #if SUMS
 SUM sum_before[4 * QUADS];  // each pixel's sum at the frame's start
@@ -77,15 +73,6 @@ vec4 coefficients_at(ivec2 pixel, int group) {
 }
 
 #if SUMS
-// Where a pixel's sums begin. A block is as high as a tile.
-ivec3 place_of_light(int quad, int pixel) {
-#if TILED
-  return corner_place + ivec3(8 * (4 * quad + pixel), 0, 0);
-#else
-  return place_of_sums(pixel_at(quad, pixel));
-#endif
-}
-
 // The layer of the sum at a position, or at the nearest one that is held.
 int layer_at(int position) {
   int layer = clamp(position - lowest, 0, held) + lowest_layer;
@@ -104,7 +91,7 @@ LIGHT light_between(SUM start, SUM end) {
 void start_light(int quad) {
   int layer = start_of(first);
   for (int pixel = 0; pixel < 4; pixel++) {
-    sum_before[4 * quad + pixel] = sum_at(place_of_light(quad, pixel), layer);
+    sum_before[4 * quad + pixel] = sum_at(place_of_sums(pixel_at(quad, pixel)), layer);
     total[4 * quad + pixel] = LIGHT(0.0);
   }
 }
@@ -158,9 +145,6 @@ void start_quad(int quad) {
 // Starts the block. False: it lies outside the picture.
 bool start_block() {
   corner = ivec2(gl_GlobalInvocationID.xy) * ivec2(1, 4 * QUADS);
-#if TILED
-  corner_place = place_of_sums(corner);
-#endif
   EACH(start_quad);
   return corner.x < size.x && corner.y < size.y;
 }
@@ -205,9 +189,9 @@ int layer_of(int frame) {
 #  include "combine.glsl"
 #endif
 
+int motion = 0;
 #if !MOVED
 const int motions = 1;
-int motion = 0;
 #endif
 #if !MOVED || !COMBINE
 void start_sight(int quad) {}
@@ -232,7 +216,7 @@ void expose(int quad, int frame, vec4 weight) {
   share[quad] += weight;
   int end = start_of(frame + 1);
   for (int pixel = 0; pixel < 4; pixel++) {
-    SUM sum = sum_at(place_of_light(quad, pixel), end);
+    SUM sum = sum_at(place_of_sums(pixel_at(quad, pixel)), end);
     total[4 * quad + pixel] += weight[pixel] * light_between(sum_before[4 * quad + pixel], sum);
     sum_before[4 * quad + pixel] = sum;
   }
@@ -271,7 +255,7 @@ void expose(int quad, int frame, vec4 weight) {
 vec4 nearest_light(int quad, int pixel, int frame) {
 #if SUMS
   int position = clamp(origin + direction * frame, 0, count - 1);
-  ivec3 place = place_of_light(quad, pixel);
+  ivec3 place = place_of_sums(pixel_at(quad, pixel));
   SUM sum = minus(sum_at(place, layer_at(position + 1)), sum_at(place, layer_at(position)));
   return covered(unit * unpacked_light(sum));
 #else

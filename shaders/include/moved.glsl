@@ -20,8 +20,6 @@ uniform int parts;
 uniform sampler2DArray summed;
 #endif
 
-int motion = 0;
-
 vec4 moved_weights(float t) {
   return vec4(((1.0 - 0.5 * t) * t - 0.5) * t,
               (1.5 * t - 2.5) * t * t + 1.0,

@@ -16,8 +16,6 @@ PAIR = 2
 
 MODES = {"average": 0, "lightest": 1, "darkest": 2, "median": 3}
 EDGES = {"hold": 0, "mirror": 1, "shorten": 2}
-# The format of a picture: {whether it is levels: format}.
-PICTURE = {False: "rgba32f", True: "rgba8"}
 LEVELS = read_pass("display", "OVER_BLACK")
 # Rows of pixels that one invocation composes: {way: rows}; BLOCK for all others.
 _LINES = {"sums": PAIR, "search": 4}
@@ -91,22 +89,10 @@ def filled_rows(rows: int) -> float:
     return next((filled for filled in _ROWS if filled >= rows), np.inf)
 
 
-def selection(groups: int, shutters: int) -> Pass:
-    """Return the pass that picks the coefficients of some shutters, in `groups` of four, from those of all shutters."""
-    return read_pass("ways", "SELECT", GROUPS=groups, ALL=shutters)
-
-
-def way_sum(begins: bool, levels: bool) -> Pass:
-    """Return the pass that adds a share of a picture or of coefficients to a sum."""
-    return read_pass("ways", BEGINS=int(begins), LEVELS=int(levels))
-
-
 def padded(values: np.ndarray) -> np.ndarray:
     """Return values (…, N) as (…, G, 4): four shutters to a texel, zeros after the last."""
-    groups = -(-values.shape[-1] // 4)
-    result = np.zeros((*values.shape[:-1], groups * 4))
-    result[..., : values.shape[-1]] = values
-    return result.reshape(*values.shape[:-1], groups, 4)
+    whole = np.pad(values, [(0, 0)] * (values.ndim - 1) + [(0, -values.shape[-1] % 4)])
+    return whole.reshape(*values.shape[:-1], -1, 4)
 
 
 def table(state: FrameState) -> np.ndarray:
@@ -169,8 +155,7 @@ def moved_tables(state: FrameState, frames: np.ndarray) -> tuple[np.ndarray, np.
     Returns:
         The table, and the moves (L · motions, 1 + N, 4) float32; by value (L · motions, 2, 4)
     """
-    if state.following is None:
-        raise ValueError("nothing is followed")
+    assert state.following is not None
     turns, shifts = state.following.at(frames)
     numbers = np.stack([turns.real - 1, turns.imag, shifts.real, shifts.imag], axis=1)  # (L, 4, N)
     values = table(state)

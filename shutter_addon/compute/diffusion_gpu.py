@@ -116,6 +116,7 @@ class Diffusion:
     """compute.diffusion.diffuse on a device. Its textures are kept until the size or the number of shutters changes."""
 
     finest = operators("LABELS")  # the passes over pixels
+    returns = False  # whether sweeps after a correction go backward
     _tiles: Texture  # the lists of tiles of all grids
 
     def __init__(self, device: Device) -> None:
@@ -234,12 +235,17 @@ class Diffusion:
             return
         sweeps = FINEST_SWEEPS if grid.finest else SWEEPS
         self._smooth(grid, sweeps)
-        first_whole = max(coarser[0].size) <= WHOLE and (grid.finest or max(grid.size) > WHOLE)
         self._hand_down(grid, *coarser)
-        for _ in range(1 + first_whole):
-            self._cycle(index + 1)
+        self._correct(index + 1)
         self._take_up(grid, coarser[0], "reached")
-        self._smooth(grid, sweeps)
+        self._smooth(grid, sweeps, back=self.returns)
+
+    def _correct(self, index: int) -> None:
+        """Improve the solution of a grid that corrects a finer one."""
+        finer, grid = self._grids[index - 1 : index + 1]
+        first_whole = max(grid.size) <= WHOLE and (finer.finest or max(finer.size) > WHOLE)
+        for _ in range(1 + first_whole):
+            self._cycle(index)
 
     def _solve_coarsest(self, grid: _Grid) -> None:
         self._run(_SOLVE, grid, "near", 1, grid.layers)  # it has one tile

@@ -29,7 +29,6 @@ NEAR_CYCLES = (4, 2)
 LAST_CYCLES = (1,)
 # Sweeps over a grid before and after its correction; the same in cycles over smooth conductances.
 SWEEPS, SMOOTH_SWEEPS = 2, 1
-NEAR_SWEEPS = 2  # over the pixels near scribbles
 # Parts of a sum over all cells.
 PARTS = 1024
 
@@ -48,11 +47,12 @@ class EdgeDiffusion(Diffusion):
     """Diffusion along edges on a device. It has other passes for pixels, and conjugate gradients on one grid."""
 
     finest = operators("LINKS")
+    returns = True
 
     def __init__(self, device: Device) -> None:
         super().__init__(device)
         self._more: dict[str, Texture] = {}  # further textures of the last solve
-        self._solved, self._sweeps = 0, 0
+        self._solved, self._sweeps, self._iterations = 0, 0, 0
 
     def solve(self, labels: np.ndarray, count: int, guide: np.ndarray, strength: float) -> Texture:  # type: ignore[override]  # it has a guide
         """Solve for coefficients, independently of earlier solves. See Diffusion.solve and compute.diffusion.diffuse.
@@ -73,8 +73,8 @@ class EdgeDiffusion(Diffusion):
         self._start(0)
         self._coarsen()
         if side > 1:
-            for iterations in NEAR_CYCLES:
-                self._near_cycle(0, iterations)
+            for self._iterations in NEAR_CYCLES:
+                self._cycle(0)
             # The pixels far from scribbles get their values from the grid that was solved.
             for fine, coarse in reversed(list(pairwise(self._grids[: self._solved + 1]))):
                 self._take_up(fine, coarse, "far")
@@ -102,19 +102,12 @@ class EdgeDiffusion(Diffusion):
         if "links" not in finest.textures:
             finest.textures["links"] = self._device.texture(*finest.size, 1, "rgba32f")
 
-    def _near_cycle(self, index: int, iterations: int) -> None:
-        """Run a V-cycle near scribbles, from this grid to that of the conjugate gradients."""
-        grid = self._grids[index]
+    def _correct(self, index: int) -> None:
+        """See Diffusion. V-cycles near scribbles go down to the grid of the conjugate gradients."""
         if index == self._solved:
-            self._conjugate_gradients(grid, iterations)
-            return
-        sweeps = NEAR_SWEEPS if grid.finest else SMOOTH_SWEEPS
-        coarse = self._grids[index + 1]
-        self._smooth(grid, sweeps)
-        self._hand_down(grid, coarse)
-        self._near_cycle(index + 1, iterations)
-        self._take_up(grid, coarse, "reached")
-        self._smooth(grid, sweeps, back=True)
+            self._conjugate_gradients(self._grids[index], self._iterations)
+        else:
+            self._cycle(index)
 
     def _conjugate_gradients(self, grid: _Grid, iterations: int) -> None:
         """Improve the grid's solution by conjugate gradients."""

@@ -23,16 +23,13 @@ from .composition_passes import (
     EDGES,
     LEVELS,
     MODES,
-    PICTURE,
     composition,
     filled_rows,
     lines_of,
     moved_tables,
     moved_way,
-    selection,
     table,
     way_of,
-    way_sum,
 )
 from .request import Coefficients, Handle, Request
 from .running_sums import STORED_SUMS, Sums, open_window
@@ -150,59 +147,6 @@ def _bits(coefficients: Coefficients) -> int:
     return (coefficients.block - 1).bit_length()
 
 
-class Displaying:
-    """Makes a display's levels of pictures on a device."""
-
-    def __init__(self, device: Device) -> None:
-        self._device = device
-        self._textures = NamedTextures(device)
-        self._sent: Memo[tuple[dict[str, Texture], float]] = Memo()
-
-    def levels(self, picture: Texture, display: Display) -> np.ndarray:
-        """Return the levels (H, W, 4) uint8 of an opaque picture of GPUCompositor.draw, top row first."""
-        width, height, _ = picture.size
-        noise, levels = display.noise(width, height), self._textures.of("levels", (width, height, 1), "rgba8")
-        images = {"picture": picture, "levels": levels}
-        own, slope = self._sent.get((display, width, height), lambda: self._send(display, noise))
-        images |= own
-        self._device.run(SHOW, (width, height), images=images, size=(width, height), slope=slope)
-        made = self._device.read(levels)[0]
-        whole = made.view("<u4")  # alpha is in the highest bits
-        unsure = np.flatnonzero(whole < 1 << 24)
-        rows, columns = np.divmod(unsure, width)
-        rows = height - 1 - rows  # pictures have the bottom row first
-        if unsure.size:
-            light = self._picked(picture, rows * width + columns)
-            found = np.full((unsure.size, 4), 255, np.uint8)
-            found[:, :3] = display.levels(light, noise[rows, columns])
-            whole.reshape(-1)[unsure] = found.view("<u4")[:, 0]
-        return made
-
-    def _picked(self, picture: Texture, places: np.ndarray) -> np.ndarray:
-        """Return the light (n, 3) of pixels, given by their numbers."""
-        size = _COLUMNS, -(-len(places) // _COLUMNS)
-        numbers = np.zeros((size[1], _COLUMNS), np.uint32)
-        numbers.ravel()[: len(places)] = places
-        sent, picked = (
-            self._textures.filled("places", [numbers], "r32ui"),
-            self._textures.of("picked", (*size, 1), "rgba32f"),
-        )
-        images = {"picture": picture, "places": sent, "picked": picked}
-        self._device.run(PICK, size, images=images, size=size, width=picture.size[0])
-        return self._device.read(picked)[0].reshape(-1, 4)[: len(places), :3]
-
-    def _send(self, display: Display, noise: np.ndarray) -> tuple[dict[str, Texture], float]:
-        """Return the textures of the noise and of the curve, and OpenColorIO's slope below it, which is not 12.92."""
-        slope = 255 * float(display.transfer(np.array([2.0**_LOWEST], np.float32))[0]) / 2.0**_LOWEST
-        grain = self._textures.filled("grain", [noise], "r32f")
-        return {"grain": grain, "curve": self._textures.filled("curve", [_curve(display)])}, slope
-
-    def release(self) -> None:
-        """Free all memory on the device. Call it inside Device.freeing."""
-        self._textures.release()
-        self._sent.clear()
-
-
 def _curve(display: Display) -> np.ndarray:
     """Return the pieces (1, n, 4) float32 of the curve for shaders/display.glsl."""
     starts = np.arange(_FIRST, _FIRST + _PIECES, dtype=np.uint32) << np.uint32(_SHIFT)
@@ -222,7 +166,7 @@ class GPUCompositor:
         self.device, self.name, self.takes_planes = device, device.name, device.takes_planes
         self.current, self.freeing = device.current, device.freeing
         self._textures = NamedTextures(device)
-        self._displaying = Displaying(device)
+        self._displayed: Memo[tuple[dict[str, Texture], float]] = Memo()
 
     def window(
         self, source: FrameSource, capacity: int, moved: bool = False, shutters: int = 4, summed: bool = True
@@ -242,7 +186,7 @@ class GPUCompositor:
 
     def read(self, drawn: Texture) -> np.ndarray:
         picture = self.device.read(drawn)[0]
-        return picture if drawn.kind == PICTURE[True] else picture[::-1]
+        return picture if drawn.kind == "rgba8" else picture[::-1]
 
     def over_black(self, drawn: Texture) -> np.ndarray:
         size = drawn.size[:2]
@@ -251,7 +195,41 @@ class GPUCompositor:
         return self.device.read(texture)[0]
 
     def shown(self, drawn: Texture, display: Display) -> np.ndarray:
-        return self._displaying.levels(drawn, display)
+        """See request.Compositor."""
+        width, height, _ = drawn.size
+        noise, levels = display.noise(width, height), self._textures.of("levels", (width, height, 1), "rgba8")
+        images = {"picture": drawn, "levels": levels}
+        own, slope = self._displayed.get((display, width, height), lambda: self._send(display, noise))
+        images |= own
+        self.device.run(SHOW, (width, height), images=images, size=(width, height), slope=slope)
+        made = self.device.read(levels)[0]
+        whole = made.view("<u4")  # alpha is in the highest bits
+        unsure = np.flatnonzero(whole < 1 << 24)
+        rows, columns = np.divmod(unsure, width)
+        rows = height - 1 - rows  # pictures have the bottom row first
+        if unsure.size:
+            light = self._picked(drawn, rows * width + columns)
+            found = np.full((unsure.size, 4), 255, np.uint8)
+            found[:, :3] = display.levels(light, noise[rows, columns])
+            whole.reshape(-1)[unsure] = found.view("<u4")[:, 0]
+        return made
+
+    def _picked(self, picture: Texture, places: np.ndarray) -> np.ndarray:
+        """Return the light (n, 3) of pixels, given by their numbers."""
+        size = _COLUMNS, -(-len(places) // _COLUMNS)
+        numbers = np.zeros((size[1], _COLUMNS), np.uint32)
+        numbers.ravel()[: len(places)] = places
+        sent = self._textures.filled("places", [numbers], "r32ui")
+        picked = self._textures.of("picked", (*size, 1))
+        images = {"picture": picture, "places": sent, "picked": picked}
+        self.device.run(PICK, size, images=images, size=size, width=picture.size[0])
+        return self.device.read(picked)[0].reshape(-1, 4)[: len(places), :3]
+
+    def _send(self, display: Display, noise: np.ndarray) -> tuple[dict[str, Texture], float]:
+        """Return the textures of the noise and of the curve, and OpenColorIO's slope below it, which is not 12.92."""
+        slope = 255 * float(display.transfer(np.array([2.0**_LOWEST], np.float32))[0]) / 2.0**_LOWEST
+        grain = self._textures.filled("grain", [noise], "r32f")
+        return {"grain": grain, "curve": self._textures.filled("curve", [_curve(display)])}, slope
 
     def draw(self, window: Handle, request: Request, coefficients: Coefficients) -> Texture:
         """Return the picture on the device, premultiplied: a texture array with one layer.
@@ -308,8 +286,8 @@ class GPUCompositor:
             images = {"part": drawn, "share": share, "mixed": window.mixed()}
             if levels:
                 images["picture"] = window.picture(levels=True)
-            program, bits = way_sum(not number, levels), _bits(coefficients)
-            self.device.run(program, size, images=images, size=size, given=size, block_bits=bits)
+            program = read_pass("ways", BEGINS=int(not number), LEVELS=int(levels))
+            self.device.run(program, size, images=images, size=size, given=size, block_bits=_bits(coefficients))
         return window.picture(levels=True) if request.levels else window.mixed()
 
     def _selected(self, handle: Texture, chosen: tuple[int, ...], count: int) -> tuple[Texture, Texture]:
@@ -321,7 +299,8 @@ class GPUCompositor:
         share = self._textures.of("share", (width, height, 1), "r32f")
         images = {"coefficients": handle, "selected": selected, "share": share}
         given: Given = {"size": (width, height), "count": len(chosen), "blocks": {"chosen": numbers}}
-        self.device.run(selection(groups, count), (width, height), images=images, **given)
+        program = read_pass("ways", "SELECT", GROUPS=groups, ALL=count)
+        self.device.run(program, (width, height), images=images, **given)
         return selected, share
 
     def _draw_on_host(self, window: Handle, request: Request, coefficients: Coefficients) -> Texture:
@@ -378,5 +357,4 @@ class GPUCompositor:
     def release(self) -> None:
         with self.device.freeing():
             self._textures.release()
-            self._displaying.release()
         self.device.release()

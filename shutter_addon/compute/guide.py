@@ -69,14 +69,10 @@ class Guides:
         if not self._kept:
             self._made.clear()
 
-    def wants(self, index: int) -> bool:
-        """Return whether `note` needs a frame."""
-        return index in self._kept and index not in self._reduced
-
-    def note(self, index: int, frame: np.ndarray) -> None:
-        """Take a frame that was read for something else."""
-        if self.wants(index):
-            self._reduced[index] = self._reduce(frame)
+    def note(self, index: int, frame: Decoded) -> None:
+        """Take a frame that was read for something else, if it is needed."""
+        if index in self._kept and index not in self._reduced:
+            self._reduced[index] = self._reduce(as_rgba(frame))
 
     def lacking(self, frames: tuple[int, ...]) -> set[int]:
         """Return the frames that `guide` would read."""
@@ -130,8 +126,7 @@ class NotedSource(SourceWrapper):
     def decoded(self, index: int) -> Decoded:
         # Always as it is decoded: colors of `read` may be rounded differently.
         frame = self._source.decoded(index)
-        if self._guides.wants(index):
-            self._guides.note(index, as_rgba(frame))
+        self._guides.note(index, frame)
         return frame
 
 

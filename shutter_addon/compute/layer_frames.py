@@ -63,13 +63,7 @@ class WeightedFrames(SourceWrapper):
     alpha, transfer = "premultiplied", "linear"
 
     def __init__(
-        self,
-        source: FrameSource,
-        weight: Callable[[int], np.ndarray],
-        *,
-        rest: bool = False,
-        alone: bool = False,
-        colored: bool = False,
+        self, source: FrameSource, weight: Callable[[int], np.ndarray], *, rest: bool, alone: bool, colored: bool
     ) -> None:
         super().__init__(source)
         self.base, self.weight, self.rest, self.alone, self.colored = source, weight, rest, alone, colored
@@ -134,10 +128,7 @@ class LayerMattes:
     """
 
     def __init__(
-        self,
-        size: tuple[int, int],
-        solve: Callable[[FrameState, int], np.ndarray],
-        reader: MatteReader | None,
+        self, size: tuple[int, int], solve: Callable[[FrameState, int], np.ndarray], reader: MatteReader | None
     ) -> None:
         self._size, self._solve, self._reader = size, solve, reader
         self._kept: Kept[Hashable, np.ndarray] = Kept()
@@ -180,9 +171,8 @@ class LayerMattes:
         return layering.behind(self.of(layers, frame))
 
     def _read(self, matte: Matte, frame: int) -> np.ndarray:
-        if self._reader is None:
-            raise ValueError("there is no reader of mattes")
         reader = self._reader
+        assert reader is not None
         moves = frame if isinstance(matte.content, FileFrame) else None
         key = matte.content, matte.feather, matte.invert, moves
         return self._get(key, lambda: reader.values((matte,), frame, 1)[0][1])

@@ -3,6 +3,7 @@ over one another (core.pixels.layering)."""
 
 from collections.abc import Callable, Collection
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from ..core.model.mattes import MatteReader
 from ..core.model.windows import source_frames
 from ..core.pixels import layering
 from . import plates, window_frames
+from .guide import Guides, NotedSource
 from .layer_frames import LayerMattes, RecentFrames, WeightedFrames
 from .request import Behind, Coefficients, Compositor, Exposure, Handle, Request, Stages
 from .window import summable
@@ -29,7 +31,7 @@ class LayeredRenderer:
         compositor: composes the parts
         stages: lays them over one another
         source: the footage
-        noted: returns a source whose frames are noted for the guides of the diffusion
+        guides: note its frames for the diffusion
         mattes: reads the values of mattes
         solve: returns coefficients (N, h, w) float32 of a state (Layers.scribbles) at a frame of a source
     """
@@ -39,35 +41,20 @@ class LayeredRenderer:
         compositor: Compositor,
         stages: Stages,
         source: FrameSource,
-        noted: Callable[[FrameSource], FrameSource],
+        guides: Guides,
         mattes: MatteReader | None,
         solve: Callable[[FrameSource, FrameState, int], np.ndarray],
     ) -> None:
         self._compositor, self._stages, self._source = compositor, stages, source
         self.recent = RecentFrames(source)
-        self._noted = noted(self.recent)
+        noted = NotedSource(self.recent, guides)
         size = source.width, source.height
         self.mattes = LayerMattes(size, lambda state, frame: solve(self.recent, state, frame), mattes)
-        self._colors = plates.LayerColors(self._noted, self.recent, self.mattes)
+        self._colors = plates.LayerColors(noted, self.recent, self.mattes)
         self._layers: Layers | None = None
         self._windows: dict[tuple, Handle] = {}
-        self._loaded: dict[int, tuple] = {}  # {source frame in the windows: Layers.key_at}
+        self._loaded: dict[tuple[int, int], tuple] = {}  # of `_keys`, for the frames in the windows
         self._crowd = 1  # the factor of the room that windows leave for one another
-        self._kinds: np.ndarray | None = None  # kinds of the last picture's pixels, if some lacked what lies behind
-        self._exposed: list[Exposure] = []
-
-    @property
-    def holes(self) -> np.ndarray | None:
-        """The kinds (H, W) uint8 of the last picture's pixels (plates). None: all that lies behind was exposed."""
-        layers = self._layers
-        if not self._exposed or layers is None or layers.camera is None:
-            return self._kinds
-        # Exposed frames are completed from others with a lower weight, which tells how much that was.
-        lacking = (1 - layering.CLEAR) * (1 - plates.TAKEN_SHARE)
-        taken = self._lacks(self._exposed, 1 - lacking)
-        if taken is None or self._kinds is None:
-            return None if taken is None else np.where(taken, plates.TAKEN, plates.OPEN).astype(np.uint8)
-        return np.where(taken & (self._kinds == plates.OPEN), np.uint8(plates.TAKEN), self._kinds)
 
     @property
     def held(self) -> Collection[int]:
@@ -88,11 +75,10 @@ class LayeredRenderer:
             plain: returns the picture without layers
         """
         layers = request.state.layers
-        if layers is None:
-            raise ValueError("there are no layers")
-        parts = self._parts(request, behind)
+        assert layers is not None
+        parts = self._parts(request, behind, layers)
         self._colors.begin(layers, behind.state.options, shot)
-        self._forget_changed(layers, parts)
+        self._forget_changed(layers)
         self._layers = layers
 
         for crowd in (2, 8, 1 << 16):
@@ -124,14 +110,12 @@ class LayeredRenderer:
         # Where there is no layer, running sums give the bits of the picture without layers. Moments between separated
         # frames differ from it on all devices.
         same = getattr(windows[-1, False], "cover", 0) or self._colors.has_moments
-        self._exposed = exposed
         plate = self._plate(request, exposed, shot, lambda: self._gain(parts[-1, False].state, coefficients))
         bottom = Behind(exposed[0], None if same else plain(), plate)
         return self._stages.lay(bottom, exposed[1:], request.levels)
 
-    def _parts(self, request: Request, behind: Request) -> Parts:
-        layers = request.state.layers
-        states = [behind.state, *(request.state.of([shutter]) for shutter in (layers.shutters if layers else ()))]
+    def _parts(self, request: Request, behind: Request, layers: Layers) -> Parts:
+        states = [behind.state, *(request.state.of([shutter]) for shutter in layers.shutters)]
         parts = {(i, False): replace(behind, state=state) for i, state in enumerate(states, -1)}
         if self._source.alpha != "opaque":
             for i, state in enumerate(states, -1):
@@ -162,40 +146,32 @@ class LayeredRenderer:
             for window in windows.values():
                 window.load(ordered[:end], options, shot)
 
-    def _forget_changed(self, layers: Layers, parts: dict) -> None:
-        """Release the windows if the mattes of a held frame, or the layers, have changed."""
-        keys = {frame: layers.key_at(frame) for frame in layers.frames}
-        count = max(name[0] for name in parts) + 1
-        if self._has_changed(keys) or (self._layers is not None and len(self._layers.shutters) != count):
+    def _forget_changed(self, layers: Layers) -> None:
+        """Release the windows if the mattes of a known frame, the camera's motions, or the layers have changed."""
+        # Drawn layers lack their scribbles in moments that this picture does not show.
+        known = [
+            frame
+            for frame, drawn, mattes in zip(layers.frames, layers.scribbles, layers.mattes, strict=True)
+            if drawn is not None or None not in mattes
+        ]
+        keys = {(frame, frame): layers.key_at(frame) for frame in known}
+        if layers.camera is not None:
+            keys |= {pair: layers.camera.between(*pair) for pair in pairwise(layers.frames)}
+        has_changed = any(self._loaded.get(name, key) != key for name, key in keys.items())
+        if has_changed or (self._layers is not None and len(self._layers.shutters) != len(layers.shutters)):
             self.release_windows()
         self._loaded |= keys
-        for frame in [frame for frame in self._loaded if abs(frame - layers.first) > 4096]:
-            del self._loaded[frame]
-
-    def _has_changed(self, keys: dict[int, tuple]) -> bool:
-        """Return whether mattes or camera motions of held frames, or of those that complete them, have changed.
-
-        Args:
-            keys: {source frame: Layers.key_at}
-        """
-        for frame in self.held:
-            asked = self._colors.asked.get(frame, {})
-            if any(self._loaded.get(each, keys[each]) != keys[each] for each in (frame, *asked) if each in keys):
-                return True
-            known = [other for other in asked if frame in keys and other in keys]
-            if any(self._colors.motion(frame, other) != asked[other] for other in known):
-                return True
-        return False
+        for name in [name for name in self._loaded if abs(name[0] - layers.first) > 4096]:
+            del self._loaded[name]
 
     def _plate(
         self, request: Request, exposed: list[Exposure], shot: range, gain: Callable[[], np.ndarray]
     ) -> np.ndarray | None:
         """Return Behind.plate. gain: returns the brightness (H, W) of its pixels."""
         layers, (bottom, *_) = request.state.layers, exposed
-        self._kinds = None
-        if layers is None or (holes := self._lacks(exposed, layering.CLEAR)) is None:
+        if layers is None or (holes := self._lacks(exposed)) is None:
             return None
-        picture, self._kinds = plates.plate(
+        picture, kinds = plates.plate(
             holes,
             plates.nearest_frames(request.index, request.state.options, shot),
             self._colors.linear_part,
@@ -203,22 +179,22 @@ class LayeredRenderer:
             lambda frame: self._colors.motion(request.index, frame),
         )
         picture[..., :3] *= gain()[..., None]
-        if (self._kinds == plates.FILLED).any():
-            shares, is_open = self._shares(bottom), self._kinds == plates.OPEN
+        if (kinds == plates.FILLED).any():
+            shares, is_open = self._shares(bottom), kinds == plates.OPEN
             around = layering.with_plate(self._compositor.read(bottom.color), shares, None)
             # Nothing is known where a layer hides everything.
-            known = np.where(is_open, shares >= layering.CLEAR, self._kinds == plates.TAKEN)
+            known = np.where(is_open, shares >= layering.CLEAR, kinds == plates.TAKEN)
             picture = plates.filled(np.where(is_open[..., None], around, picture), known)
         if self._source.alpha == "opaque":
             picture[..., 3] = 1  # even if nothing is known
         return picture
 
-    def _lacks(self, exposed: list[Exposure], least: float) -> np.ndarray | None:
-        """Return where (H, W) less than `least` of what lies behind is exposed, and visible. None: nowhere."""
+    def _lacks(self, exposed: list[Exposure]) -> np.ndarray | None:
+        """Return where (H, W) too little of what lies behind is exposed, and visible. None: nowhere."""
         bottom, *own = exposed
-        if self._stages.least_share(bottom) >= least:
+        if self._stages.least_share(bottom) >= layering.CLEAR:
             return None
-        holes = self._shares(bottom) < least
+        holes = self._shares(bottom) < layering.CLEAR
         holes &= layering.behind([self._shares(layer) for layer in own]) > _SEEN
         return holes if holes.any() else None
 
@@ -242,7 +218,6 @@ class LayeredRenderer:
         self._windows.clear()
         self._loaded.clear()
         self._colors.clear()
-        self._exposed = []
 
     def release(self) -> None:
         """Free all memory on the device and all cached frames."""

@@ -15,7 +15,6 @@ from ..core.pixels import compositor, layering
 from .layer_frames import LayerMattes, RecentFrames, linear, with_colors
 
 T = TypeVar("T")
-Motion = tuple[complex, complex]
 
 # Frames that are cached for windows, which load them one after another.
 TOGETHER = 4
@@ -35,7 +34,6 @@ class LayerColors:
 
     Attributes:
         layers: those of the last `begin`
-        asked: {source frame: {frame that fills what layers cover: the camera's motion to it}}
     """
 
     layers: Layers
@@ -45,7 +43,6 @@ class LayerColors:
     def __init__(self, source: FrameSource, recent: RecentFrames, mattes: LayerMattes) -> None:
         self._source, self._recent, self._mattes = source, recent, mattes
         self._kept: Kept[tuple, Any] = Kept()
-        self.asked: dict[int, dict[int, Motion]] = {}
 
     def begin(self, layers: Layers, options: Options, shot: range) -> None:
         """Set layers and options for the next frames. shot: the frames that may show what lies behind."""
@@ -131,24 +128,15 @@ class LayerColors:
         return with_colors(picture, colors, kinds == TAKEN, self._source), share
 
     def _plate(self, frame: int, covered: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        layers = self.layers
-        asked = self.asked[frame] = {}
-        for old in [old for old in self.asked if abs(old - frame) > 4096]:
-            del self.asked[old]
-
-        def motion(other: int) -> Motion:
-            asked[other] = self.motion(frame, other)
-            return asked[other]
-
         return plate(
             covered,
             (other for other in nearest_frames(frame, self._options, self._shot) if other != frame),
             self.linear_part,
-            lambda other: self._mattes.behind(layers, other),
-            motion,
+            partial(self._mattes.behind, self.layers),
+            partial(self.motion, frame),
         )
 
-    def motion(self, frame: int, other: int) -> Motion:
+    def motion(self, frame: int, other: int) -> tuple[complex, complex]:
         """Return how the camera's view moves from one frame to another."""
         return self.layers.camera.between(frame, other) if self.layers.camera else (1, 0)
 
@@ -159,7 +147,6 @@ class LayerColors:
     def clear(self) -> None:
         """Forget all frames."""
         self._kept.clear()
-        self.asked.clear()
 
 
 def nearest_frames(index: int, options: Options, shot: range) -> Iterable[int]:

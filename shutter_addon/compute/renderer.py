@@ -17,6 +17,7 @@ from ..core.model.mattes import MatteReader
 from ..devices.device import Budget, NoDeviceError
 from . import guide, window_frames
 from .cpu import CPUCompositor
+from .gpu import GPUCompositor
 from .layered_renderer import LayeredRenderer
 from .request import Coefficients, Compositor, Handle, Request
 
@@ -24,19 +25,13 @@ if TYPE_CHECKING:
     from ..devices.gl import GLDevice
 
 
-def open_compositor(
-    device: str = "gpu", budget: Budget | None = None, ask_others: Callable[[], None] | None = None
-) -> Compositor:
-    """Return the compositor "gpu" (OpenGL 4.3) or "cpu" (NumPy). budget, ask_others: as for Device.
+def open_compositor(device: str = "gpu") -> Compositor:
+    """Return the compositor "gpu" (OpenGL 4.3) or "cpu" (NumPy).
 
     Raises:
         NoDeviceError: there is no OpenGL 4.3
     """
-    if device == "cpu":
-        return CPUCompositor()
-    from .gpu import GPUCompositor
-
-    return GPUCompositor(open_gl(budget, ask_others))
+    return CPUCompositor() if device == "cpu" else GPUCompositor(open_gl())
 
 
 def open_gl(budget: Budget | None = None, ask_others: Callable[[], None] | None = None) -> GLDevice:
@@ -142,7 +137,7 @@ class Renderer:
                 self.compositor,
                 self._stages,
                 self.source,
-                lambda source: guide.NotedSource(source, self._guides),
+                self._guides,
                 self._mattes and self._mattes.another(),
                 self._solved_apart,
             )
@@ -196,14 +191,6 @@ class Renderer:
         with self.compositor.current():
             return self.compositor.labels(self.labels(request)[0].labels), request.state.options.aggregate
 
-    def drawn_holes(self, request: Request) -> tuple[Handle, int]:
-        """Return the picture's holes on a GPU, like drawn_labels; 0 where there is none."""
-        with self.compositor.current():
-            self.draw(request)
-            if self.holes is None or request.state.layers is None:
-                return self.compositor.labels(np.zeros((1, 1), np.uint16)), self._everywhere
-            return self.compositor.labels(self.holes), 1
-
     def labels(self, request: Request) -> list[LabelLayer]:
         """Return labels of the request's scribbles, for each of scribbles.layers."""
         state, size = request.state, grid(self.source, request.state)
@@ -241,12 +228,6 @@ class Renderer:
             return []
         with self.compositor.current():
             return self._layering().mattes.of(request.state.layers, request.index if frame is None else frame)
-
-    @property
-    def holes(self) -> np.ndarray | None:
-        """See LayeredRenderer.holes. They belong to the last picture with layers; top row first."""
-        with self.compositor.current():
-            return self._layered.holes if self._layered else None
 
     def _want(self, request: Request) -> list[int]:
         """See window_frames.want."""
@@ -364,17 +345,6 @@ class Renderer:
             mixed = self._stages.add(mixed, solved, layer.share, layer.labels.shape)
         return mixed
 
-    def release_window(self) -> None:
-        """Free the window's frames and those of the search for cuts. The next picture reads them again."""
-        with self.compositor.freeing():
-            self._drop_window()
-            if self._layered is not None:
-                self._layered.release_windows()
-                self._kept_picture.clear()
-            self._guides.keep(())
-        if self.source.shots is not None:
-            self.source.shots.release()
-
     def _drop_window(self) -> None:
         if self._window is not None:
             self._window.release()
@@ -383,15 +353,18 @@ class Renderer:
             self._kept_picture.clear()
 
     def release(self) -> None:
-        """Free all memory on the device. The next picture makes it again."""
+        """Free all memory on the device, and the frames of the search for cuts. The next picture reads them again."""
         with self.compositor.freeing():
-            self.release_window()
+            self._drop_window()
             self._stages.release()
             for part in (self._layered, self._scribbles):
                 if part is not None:
                     part.release()
-        self._kept_diffusion.clear()
-        self._kept_mattes.clear()
+        self._guides.keep(())
+        for kept in (self._kept_picture, self._kept_diffusion, self._kept_mattes):
+            kept.clear()
+        if self.source.shots is not None:
+            self.source.shots.release()
 
     def close(self) -> None:
         """Free all memory on the device, and close the source."""

@@ -1,5 +1,5 @@
-"""Running sums along time on a device: which sums a window holds, and which it makes when it moves; and which window is
-the fastest."""
+"""Running sums along time on a device: which sums a window holds, and which ones it makes when it moves. And the choice
+of the fastest window."""
 
 from __future__ import annotations
 
@@ -25,9 +25,16 @@ _LISTED = 256  # tiles in a row of a list, as in shaders/accumulate.glsl
 def open_window(
     device: Device, source: FrameSource, capacity: int, moved: bool, shutters: int, summed: bool = True
 ) -> Window:
-    """The fastest window of `capacity` frames: running sums if they can be made of the source and the device has room
-    for them, else the frames. moved: what is seen of a frame lies elsewhere in it, so it has to be whole. shutters:
-    those whose coefficients have to have room beside it. summed: all that is made of the frames are sums of them."""
+    """Return the fastest window: running sums if the source allows them and the device has room, else frames.
+
+    Args:
+        device: the device
+        source: the footage
+        capacity: the most frames in the window
+        moved: exposures follow something, so each frame has to be whole
+        shutters: the shutters whose coefficients need room beside the window
+        summed: pictures are only made of sums of the frames
+    """
     if moved:
         return (PackedFrames if summable(source) else WholeFrames)(device, source, capacity, shutters)
     with suppress(NoDeviceError):
@@ -38,32 +45,28 @@ def open_window(
     return Frames(device, source, capacity, shutters)
 
 
-def stores_rows(device: Device) -> bool:
-    """Whether the device keeps textures in memory row by row."""
-    return llvmpipe.is_llvmpipe(device.name)
-
-
 # What running sums are stored as, by COVER of shaders/include/sums.glsl.
 STORED_SUMS = ("rgba16ui", "rgba32ui", "rgba32ui")
 
 
 def accumulation(decode: int, sent: str, back: bool, tiled: bool, cover: int = 0, kind: int = 1) -> Pass:
-    """The pass that makes a layer of sums from its neighbour: with the frame between the two added, or subtracted.
+    """Return the pass that makes a layer of sums from its neighbor, by adding or subtracting the frame between the two.
 
-    decode: of `decoding`
-    sent: as what the frame was sent, "COLOURS", "NUMBERS" (Device.send), "PLANES" or "MOMENT"; "AGAIN": it is taken as
-    the difference of two layers that hold it already
-    back: it is subtracted
-    tiled: the sums are stored in tiles
-    cover: of WeightedSums
-    kind: of moments, MOMENT of the shader
+    Args:
+        decode: of `decoding`
+        sent: how the frame was sent: "COLOURS", "NUMBERS" (Device.send), "PLANES" or "MOMENT". "AGAIN": it is the
+            difference of two layers that hold it already.
+        back: whether it is subtracted
+        tiled: whether sums are stored in tiles
+        cover: of WeightedSums
+        kind: MOMENT of the shader, for moments
     """
     macros = {"DECODE": decode, "BACK": int(back), "TILED": int(tiled), "COVER": cover, sent: kind}
     return read_pass("accumulate", STORED=STORED_SUMS[cover], **macros)
 
 
 def _in_fours(plane: np.ndarray) -> np.ndarray:
-    """Samples uint8 (h, w) as uint32 (h, ⌈w/4⌉), four side by side."""
+    """Return samples uint8 (h, w) as uint32 (h, ⌈w/4⌉), four side by side."""
     if missing := -plane.shape[1] % 4:
         plane = np.pad(plane, ((0, 0), (0, missing)))
     return np.ascontiguousarray(plane).view(np.dtype("<u4"))
@@ -85,22 +88,20 @@ def _by_level(moment: Moment, part: Part, given: Given) -> Iterator[tuple[int, t
 
 
 class Sums(Window):
-    """A window of running sums of opaque 8-bit frames, in the light that is summed (Options.light), in textures
-    rgba16ui: three fields of 21 bits for each pixel.
+    """A window of running sums of opaque 8-bit frames, in the light that is summed (Options.light).
 
-    Layer p mod `layers` holds the sum at position p, for the positions from `start` to `stop`, both included: the light
-    of all frames before p, counted from an arbitrary one. So sums mean something only in differences: that of
-    positions p and p + 1 is the frame at p. Positions beyond the shot's ends count, with the frames that Options.edges
-    shows there.
+    Textures are rgba16ui: three fields of 21 bits for each pixel. Layer p mod `layers` holds the sum at position p, for
+    the positions from `start` to `stop`, both included: the light of all frames before p, counted from an arbitrary
+    one. So only differences mean something: the sum at p + 1 less the sum at p is the frame at p. Positions beyond the
+    shot's ends have the frames that Options.edges shows there.
 
-    A window that moves by a frame, onwards or back, makes one new layer. Sums are integers that wrap around, so that
-    their differences are exact, whatever the window held before.
+    A window that moves by a frame, onwards or back, makes one new layer. Sums are integers that wrap around, so their
+    differences are exact, whatever the window held before.
 
-    whole: what white is in a field
-    tiled: whether pixels are stored tile by tile, in TILE
+    Attributes:
+        whole: the value of white in a field
+        tiled: whether pixels are stored tile by tile, in TILE
     """
-
-    _loading: tuple[tuple[str, str], ...] = (("frame", "rgba8"),)
 
     def __init__(self, device: Device, source: FrameSource, capacity: int, shutters: int = 1) -> None:
         self.layers = capacity + 1
@@ -115,24 +116,21 @@ class Sums(Window):
         # A workgroup reads all layers of its pixels. In tiles, they are one run of memory.
         across, down = TILE
         fits = across * down * self.layers <= device.max_size and -(-source.height // down) <= device.max_layers
-        self.tiled = stores_rows(device) and fits
+        self.tiled = llvmpipe.is_llvmpipe(device.name) and fits
         super().__init__(device, source, capacity, shutters)
-
-    def _allocate(self) -> None:
-        super()._allocate()
-        if self.source.step > 1:
-            self._two_frames()
 
     @property
     def held(self) -> Collection[int]:
-        """The source frames that are summed, a collection of their indices."""
+        """The source frames that are summed."""
         return self._frames.values()
 
     def load(self, positions: np.ndarray, options: Options, shot: range) -> None:
-        """Reads the frames at these positions that are not loaded.
+        """Read the frames at these positions that are not loaded.
 
-        positions: of core.model.windows.positions; the first and the last less than `capacity` apart
-        shot: the source frames that the window may show (core.model.windows.source_frames)
+        Args:
+            positions: of core.model.windows.positions; the first and the last are less than `capacity` apart
+            options: those of the picture
+            shot: the source frames that the window may show (core.model.windows.source_frames)
         """
         self.device.use(self.release)
         self.shot = shot
@@ -151,8 +149,10 @@ class Sums(Window):
             self.start -= 1
 
     def _continues(self, first: int, frames: list[int], options: Options) -> bool:
-        """Whether the sums can be moved to the positions from `first` on, which show `frames`: the two meet or overlap,
-        and show the same frames where they overlap."""
+        """Return whether the sums can move to the positions from `first` on, which show `frames`.
+
+        They can if both ranges meet or overlap, and show the same frames where they overlap.
+        """
         last = first + len(frames)
         overlap = range(max(first, self.start), min(last, self.stop))
         return (
@@ -163,12 +163,12 @@ class Sums(Window):
         )
 
     def _keep(self, start: int, stop: int) -> None:
-        """Gives up all positions but those from `start` to `stop`."""
+        """Give up all positions but those from `start` to `stop`."""
         self.start, self.stop = start, stop
         self._frames = {position: frame for position, frame in self._frames.items() if start <= position < stop}
 
     def _together(self, frames: list[int]) -> list[int]:
-        """Those of the next source frames that one pass may add: moments of a pair, one after the other."""
+        """Return those of the next source frames that one pass may add: moments of a pair, one after another."""
         step, first = self.source.step, frames[0]
         pair = range(first, first - first % step + step)
         if self.cover or first % step == 0 or any(frame in pair for frame in self.held):
@@ -176,10 +176,17 @@ class Sums(Window):
         return [frame for frame, wanted in zip(frames, pair, strict=False) if frame == wanted]
 
     def _add(self, light: Light, frames: list[int], known: int, next_: int) -> int:
-        """Makes the sum at position next_, from that at its neighbour `known` and the source frame between the two; of
-        several frames, those at the positions behind as well, if they are moments. Returns how many it has made.
+        """Make the sum at a position, from its neighbor and the source frame between the two.
 
-        light: what is summed"""
+        Args:
+            light: what is summed
+            frames: that frame, and the next ones, which are added as well if they are moments
+            known: the neighbor's position
+            next_: the position
+
+        Returns:
+            The number of sums that were made
+        """
         frame = frames[0]
         # A position that shows this frame already: it need not be read.
         same = next((position for position, held in self._frames.items() if held == frame), None)
@@ -213,8 +220,11 @@ class Sums(Window):
         return across * down * self.layers, -(-self.source.width // across), -(-part.height // down)
 
     def _send(self, frames: list[int]) -> tuple[str, Given]:
-        """Sends a source frame: as what (`accumulation`), and the arguments of the pass that adds it; with those behind
-        it where they are moments."""
+        """Send a source frame, and the next ones if they are moments.
+
+        Returns:
+            How it was sent (`accumulation`), and the arguments of the pass that adds it
+        """
         index, may_be_moment = frames[0], self.source.step > 1
         frame = self.source.decoded(index) if self.device.takes_planes or may_be_moment else self.source.read(index)
         if isinstance(frame, Planes):
@@ -264,7 +274,7 @@ class Sums(Window):
         }
 
     def _evenly(self, moment: Moment, indices: list[int]) -> Iterator[Moment]:
-        """Of the next source frames those that are moments of the same pair, as far apart as its steps."""
+        """Yield those of the next source frames that are moments of the same pair, as far apart as its steps."""
         for number, index in enumerate(indices, moment.number + 1):
             frame = self.source.decoded(index)
             if not isinstance(frame, Moment) or (frame.pair, frame.number) != (moment.pair, number):
@@ -272,9 +282,12 @@ class Sums(Window):
             yield frame
 
     def _filmed(self, moment: Moment) -> tuple[Texture, int]:
-        """The two frames of a moment on the device, and the layer of the first: they stay for all moments of their
-        pair, and one for the next."""
-        texture, sent = self._two_frames(), self._sent
+        """Return the two frames of a moment on the device, and the layer of the first.
+
+        Both stay for all moments of their pair, and one of them for the next pair.
+        """
+        texture = self._extra.of("filmed", (self.source.width, self.source.height, 2), "r32ui")
+        sent = self._sent
         start = int(sent.get(1) == moment.pair[0] or sent.get(0) == moment.pair[1])
         for layer, number, frame in zip((start, 1 - start), moment.pair, moment.ends, strict=True):
             if sent.get(layer) != number:
@@ -283,20 +296,16 @@ class Sums(Window):
                 sent[layer] = number
         return texture, start
 
-    def _two_frames(self) -> Texture:
-        return self._extra.of("filmed", (self.source.width, self.source.height, 2), "r32ui")
-
     def release(self) -> None:
         self._frames, self._light, self._sent, self._vectors = {}, None, {}, None
         super().release()
 
 
 class WeightedSums(Sums):
-    """A window of running sums of opaque 8-bit frames that are weighted pixel by pixel, as layers are exposed
-    (core.pixels.layering), and of their weights, in textures rgba32ui: four fields of 32 bits. Where the weights are 1,
-    its pictures have the bits of Sums."""
+    """A window of running sums of weights and of opaque 8-bit frames times these, for layers (core.pixels.layering).
 
-    _loading = (*Sums._loading, ("weights", "r32f"))
+    Textures are rgba32ui: four fields of 32 bits. Where the weights are 1, pictures have the bits of Sums.
+    """
 
     def __init__(self, device: Device, source: WeightedFrames, capacity: int, shutters: int = 1) -> None:
         self.cover, self._weight = 2 if source.rest else 1, source.weight

@@ -9,7 +9,7 @@ import numpy as np
 from ..core.model.mattes import Matte
 from ..devices.device import Device, Given, NamedTextures, Texture
 from ..devices.passes import read_pass
-from .composition_passes import padded, way_sum
+from .composition_passes import padded
 from .diffusion import follows_edges
 from .diffusion_gpu import Diffusion
 from .edge_diffusion_gpu import EdgeDiffusion
@@ -57,7 +57,8 @@ class Stages:
         whole = self._textures.filled("share", [np.full((1, 1, 1), share, np.float32)], "r32f")
         images = {"part": added, "share": whole, "mixed": result}
         given: Given = {"size": (width, height), "given": added.size[:2], "block_bits": max(size).bit_length()}
-        self._device.run(way_sum(mixed is None, levels=False), result.size, images=images, **given)
+        program = read_pass("ways", BEGINS=int(mixed is None), LEVELS=0)
+        self._device.run(program, result.size, images=images, **given)
         return result
 
     def blend(

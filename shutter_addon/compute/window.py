@@ -13,7 +13,7 @@ from ..core.model import windows
 from ..core.model.frame_state import Light, Options
 from ..devices import llvmpipe
 from ..devices.device import Device, NamedTextures, NoDeviceError, Texture, texel_bytes
-from ..devices.passes import Pass, read_pass
+from ..devices.passes import read_pass
 
 # The most bytes of a texture array.
 BAND_BYTES = llvmpipe.MOST_BYTES
@@ -70,7 +70,6 @@ class Window:
     kind: str
     cover = 0
     is_open = sends = False
-    _loading: tuple[tuple[str, str], ...] = ()  # names and formats of textures that load frames
 
     def __init__(self, device: Device, source: FrameSource, capacity: int, shutters: int) -> None:
         self.device, self.source, self.capacity, self.shutters = device, source, capacity, shutters
@@ -100,8 +99,6 @@ class Window:
         for part in self.parts:
             self._textures.append(self.device.texture(*self._size(part), self.kind))
         self.picture()
-        for name, kind in self._loading:
-            self._own(name, kind)
 
     def _divided(self, most: int) -> list[Part]:
         """Return bands of rows with all layers: at most `most` bytes or BLOCK rows, and a multiple of BLOCK rows."""
@@ -255,7 +252,6 @@ class PackedFrames(WholeFrames):
     """A window of opaque 8-bit frames, packed in the light that is summed (shaders/pack.glsl)."""
 
     _light: Light = "linear"
-    _loading = (("sent", "rgba8"),)
 
     def _kind(self, source: FrameSource) -> str:
         return "rgba16ui"
@@ -276,15 +272,11 @@ class PackedFrames(WholeFrames):
     def _write(self, texture: Texture, rows: np.ndarray, layer: int) -> None:
         sent = self._own("sent", "rgba8")
         self.device.write(sent, rows, opaque=True)
-        program = packing(decoding(self.source.transfer, self._light), self._light == "linear")
+        decode, squared = decoding(self.source.transfer, self._light), int(self._light == "linear")
+        program = read_pass("pack", DECODE=decode, SQUARED=squared)
         textures, images = {"frame": sent}, {"packed_frames": texture}
         size, last = texture.size[:2], (self.source.width - 1, self.source.height - 1)
         self.device.run(program, size, textures=textures, images=images, size=size, last=last, layer=layer)
-
-
-def packing(decode: int, squared: bool) -> Pass:
-    """Return the pass that packs a frame. decode: of `decoding`; squared: whether linear light is summed."""
-    return read_pass("pack", DECODE=decode, SQUARED=int(squared))
 
 
 def decoding(stored: str, light: str) -> int:

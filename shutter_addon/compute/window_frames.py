@@ -1,8 +1,7 @@
-"""Which source frames a picture is made of: those of its window, within its shot, and those that guide its diffusion;
-and which are decoded in advance: those that a picture lacks, then those of the next ones.
+"""Which source frames a picture needs, for its window and its diffusion, and which are decoded in advance.
 
-beside, in all functions: how far the frames that guide the diffusion lie from the shown one (guide.reach), 0 where none
-do.
+In all functions, `beside` is the distance of the frames that guide the diffusion from the shown one (guide.reach); 0:
+none do.
 """
 
 from collections.abc import Callable
@@ -20,22 +19,27 @@ _AHEAD, _DECODED, _DECODED_BYTES = 4, 8, 256 << 20
 
 
 def shots_of(request: Request, source: FrameSource) -> ShotFinder | None:
-    """What finds the cuts at which the window ends, if Options.stop_at_cuts is set and the source knows its shots."""
+    """Return what finds the cuts at which the window ends; None: Options.stop_at_cuts is off, or there is none."""
     return source.shots if request.state.options.stop_at_cuts else None
 
 
 def reach(request: Request, beside: int) -> tuple[int, int]:
-    """The first and the last of all positions that any shutter exposes, and of the shown frame itself with the frames
-    that guide the diffusion."""
+    """Return the first and last position that any shutter exposes, that is shown, or that guides the diffusion."""
     low, high = windows.reach(request.state, request.index, request.direction)
     return min(low, request.index - beside), max(high, request.index + beside)
 
 
 def shot_of(request: Request, source: FrameSource, beside: int, *, known: bool = False) -> range:
-    """The source frames that the window may show: those of the shot around the shown one. Ends of the shot that the
-    window does not reach are not looked for: the clip's ends take their place.
+    """Return the source frames that the window may show: those of the shot around the shown one.
 
-    It reads frames in which cuts are looked for. known: it reads none, and knows only the cuts found before."""
+    It looks only for those ends of the shot that the window reaches; the clip's ends take the place of others.
+
+    Args:
+        request: the picture
+        source: the footage
+        beside: see above
+        known: read no frame to look for cuts; only cuts that were found before count
+    """
     index, (low, high), shots = request.index, reach(request, beside), shots_of(request, source)
     if shots is None:
         return range(source.count)
@@ -53,13 +57,13 @@ def shot_of(request: Request, source: FrameSource, beside: int, *, known: bool =
 
 
 def slid(request: Request, shot: range) -> Request:
-    """The request with what it exposes moved into the shot, where its edges "slide": nothing is left of that."""
+    """Return the request with its exposure moved into the shot (edges "slide"), and edges "hold"."""
     state = windows.slid(request.state, request.index, request.direction, shot)
     return replace(request, state=replace(state, options=replace(state.options, edges="hold")))
 
 
 def looked_for_cuts(request: Request, source: FrameSource, beside: int) -> tuple[set[int], set[int]]:
-    """The source frames in which `shot_of` will look for cuts, and those in which it has, which wait to be read."""
+    """Return the source frames in which `shot_of` will look for cuts, and those in which it did, which wait."""
     low, high = reach(request, beside)
     if (shots := shots_of(request, source)) is None:
         return set(), set()
@@ -67,9 +71,11 @@ def looked_for_cuts(request: Request, source: FrameSource, beside: int) -> tuple
 
 
 def positions(request: Request, shot: range) -> np.ndarray:
-    """The positions (core.model.windows.positions) that any shutter exposes, whether it has a scribble or
-    not. Where frames of them are left out (edges "shorten"), all positions of the window that have a frame: the nearest
-    may be needed in place of those."""
+    """Return the positions (core.model.windows.positions) that any shutter exposes, with or without a scribble.
+
+    If frames of them are missing (edges "shorten"), return all positions of the window that have a frame, since the
+    nearest one may take their place.
+    """
     state = request.state
     within = windows.positions(state.options, request.index, request.direction)
     exposed = slice(*state.open_span)
@@ -80,23 +86,29 @@ def positions(request: Request, shot: range) -> np.ndarray:
 
 
 def exposed_frames(request: Request, shot: range) -> set[int]:
-    """The source frames at `positions`."""
+    """Return the source frames at `positions`."""
     return set(windows.source_frames(request.state.options, positions(request, shot), shot).tolist())
 
 
 def guided_later(request: Request, beside: int) -> list[int]:
-    """The source frames that guide the diffusion of this picture, and will guide that of the next ones, of those that
-    this one reads."""
+    """Return those of the source frames that a picture reads that guide its diffusion or that of the next pictures."""
     index, step, (low, high) = request.index, request.state.options.step, reach(request, beside)
     onwards = range(index - beside, high + 1) if request.direction > 0 else range(low, index + beside + 1)
     return [i for i in onwards if i % step == 0 or i == index]
 
 
 def want(source: FrameSource, index: int, direction: int, missing: Callable[[int], set[int]]) -> list[int]:
-    """Has the frames decoded that the picture of frame `index` lacks, then those of the next pictures. Returns the
-    frames to be wanted once that picture is made: the rest is on the device by then.
+    """Have the frames decoded that a picture lacks, then those of the next pictures.
 
-    missing: gives the source frames that the picture of a frame lacks, as far as cuts are known"""
+    Args:
+        source: the footage
+        index: the frame that the picture shows
+        direction: of the request
+        missing: returns the source frames that the picture of a frame lacks, as far as cuts are known
+
+    Returns:
+        The frames to be wanted once the picture is made; the others are on the device by then
+    """
     indices = (index + step * direction * source.step for step in range(_AHEAD + 1))
     lacking = [missing(min(max(shown, 0), source.count - 1)) for shown in indices]
     source.want(_in_order(source, lacking))

@@ -50,22 +50,13 @@ class Budget:
     """The memory that textures may take on a GPU, shared by all devices on it. Usable on any thread.
 
     Attributes:
+        limit: the most bytes
         used: bytes that are taken
     """
 
-    def __init__(self, limit: int | None = None) -> None:
-        self._limit, self.used = limit, 0
+    def __init__(self, limit: int) -> None:
+        self.limit, self.used = limit, 0
         self._lock = Lock()
-
-    @property
-    def limit(self) -> int:
-        """The most bytes. Until a device tells its memory, that of a GPU that does not tell."""
-        return allowed(None) if self._limit is None else self._limit
-
-    def tell(self, memory: int | None) -> None:
-        """Set the limit, if there is none, from the bytes of the GPU's memory (None: unknown)."""
-        if self._limit is None:
-            self._limit = allowed(memory)
 
     def take(self, size: int) -> bool:
         """Take bytes if they are free. Return whether they were."""
@@ -156,8 +147,8 @@ class Device:
     max_layers: int
     takes_planes = False
 
-    def __init__(self, budget: Budget | None = None, ask_others: Callable[[], None] | None = None) -> None:
-        self.budget, self.ask_others = budget or Budget(), ask_others
+    def __init__(self, budget: Budget, ask_others: Callable[[], None] | None) -> None:
+        self.budget, self.ask_others = budget, ask_others
         self._held: dict[Texture, None] = {}  # textures on the device, least recently used first
         self._windows: dict[Callable[[], None], None] = {}  # what frees each window, likewise; the last one is in use
 
@@ -201,7 +192,7 @@ class Device:
             opaque: every alpha is full, so the device may send only the colors
 
         Raises:
-            TypeError: only passes write and read this format (rgba16ui and rgba32ui on Blender's GPU)
+            KeyError: only passes write and read this format (rgba16ui and rgba32ui on Blender's GPU)
         """
         raise NotImplementedError
 
@@ -219,7 +210,7 @@ class Device:
         """Return a copy (layers, height, width, components) in the format's type, after all passes so far.
 
         Raises:
-            TypeError: as for `write`
+            KeyError: as for `write`
         """
         raise NotImplementedError
 
@@ -277,7 +268,7 @@ class Device:
         for texture in wanted:
             if texture.own is None:
                 if texture.waiting is None:
-                    raise ValueError("the texture was released")
+                    raise ValueError("the texture was released")  # LayeredRenderer tries again
                 texture.own = self._made(texture, wanted)
                 for layer, values in enumerate(texture.waiting):
                     self.write(texture, values, layer)

@@ -10,7 +10,7 @@ from typing import Any, Self
 import moderngl
 import numpy as np
 
-from .device import Budget, Device, NoDeviceError, Texture, machine_memory
+from .device import Budget, Device, NoDeviceError, Texture, allowed, machine_memory
 from .llvmpipe import is_llvmpipe
 from .passes import Pass
 
@@ -93,7 +93,7 @@ def _memory(context: moderngl.Context, renderer: str) -> int | None:
 
 
 class GLDevice(Device):
-    """A Device on a new OpenGL 4.3 context. It tells the budget how much memory there is.
+    """A Device on a new OpenGL 4.3 context. budget: None: what is allowed of the GPU's memory.
 
     Do not use it on a thread with a current GLX context, such as Blender's main thread on X11: EGL does not replace
     that context, which would get the calls.
@@ -105,7 +105,6 @@ class GLDevice(Device):
     takes_planes = True
 
     def __init__(self, budget: Budget | None = None, ask_others: Callable[[], None] | None = None) -> None:
-        super().__init__(budget, ask_others)
         backend: dict[str, Any] = {"backend": "egl"} if _EGL else {}
         try:
             with _kept_context():
@@ -114,9 +113,10 @@ class GLDevice(Device):
                     _gl(name)
                 with self._context:  # not current afterwards, so that another thread can use it
                     info = self._context.info
-                    self.budget.tell(_memory(self._context, info["GL_RENDERER"]))
+                    budget = budget or Budget(allowed(_memory(self._context, info["GL_RENDERER"])))
         except Exception as error:  # moderngl raises whatever its platform raises
             raise NoDeviceError(f"no OpenGL 4.3: {error}") from None
+        super().__init__(budget, ask_others)
         self._programs: dict[Pass, tuple[moderngl.ComputeShader, dict[str, Any]]] = {}
         self._blocks: dict[int, moderngl.Buffer] = {}
         self.name = info["GL_RENDERER"]

@@ -114,30 +114,25 @@ def _declared(program: Pass, line: str) -> str:
     return line
 
 
-# States of a condition: its lines count; a later branch may count; no branch counts any more.
-_LIVE, _WAITS, _OVER = range(3)
-
-
 def _live(path: Path, macros: Mapping[str, int | str]) -> Iterator[str]:
     """Yield the lines whose conditions hold and blanks for others, with includes in place and #line numbers."""
     yield "#line 1"
-    around: list[int] = []  # the states of the conditions around a line
+    around = [(True, True)]  # of the conditions around a line: whether its lines count, and no later branch can
     for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
         word, rest = found.groups() if (found := _DIRECTIVE.fullmatch(line.partition("  //")[0])) else ("", "")
         if word in ("if", "ifdef"):
-            condition = rest if word == "if" else f"defined({rest})"
-            reached = all(state == _LIVE for state in around)
-            around.append((_LIVE if _holds(condition, macros) else _WAITS) if reached else _OVER)
+            reached, condition = around[-1][0], rest if word == "if" else f"defined({rest})"
+            counts = reached and _holds(condition, macros)
+            around.append((counts, counts or not reached))
         elif word in ("elif", "else"):
-            if around[-1] != _WAITS:
-                around[-1] = _OVER
-            elif word == "else" or _holds(rest, macros):
-                around[-1] = _LIVE
+            is_over = around[-1][1]
+            counts = not is_over and (word == "else" or _holds(rest, macros))
+            around[-1] = counts, counts or is_over
         elif word == "endif":
             around.pop()
         elif word not in ("", "include", "define"):
             raise ValueError(f"{path.name}, line {number}: #{word} is not supported")
-        live = all(state == _LIVE for state in around)
+        live = around[-1][0]
         if live and word == "include":
             yield from _live(SHADERS / "include" / rest.strip('"'), macros)
             yield f"#line {number + 1}"

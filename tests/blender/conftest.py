@@ -84,7 +84,7 @@ def render(bpy, tmp_path, monkeypatch):
     from shutter_addon.blender.rendering import engine
 
     faults = []
-    monkeypatch.setattr(engine, "fail", lambda _engine, sentence: faults.append(sentence))
+    monkeypatch.setattr(engine.VirtualShutterEngine, "fail", lambda _engine, sentence: faults.append(sentence))
 
     def rendered(scene, frames, depth="8"):
         scene.render.image_settings.file_format = "PNG"

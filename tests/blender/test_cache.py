@@ -4,11 +4,10 @@ import shutil
 
 import numpy as np
 import pytest
-from support import effect_of, image_strip, recipe, remembering, request, write_frames
+from support import effect_of, image_strip, recipe, request, write_frames
 
 from shutter_addon.blender import handlers
 from shutter_addon.blender.data import fcurves, source_media, strips
-from shutter_addon.blender.editing import reconcile
 from shutter_addon.blender.rendering import invalidation, session
 from shutter_addon.media import sequence
 
@@ -144,16 +143,6 @@ def test_the_cache_is_on(bpy, edit, effect, render):
     finally:
         handlers.register()
     assert not np.array_equal(render(edit, [FRAME])[FRAME], before)
-
-
-def test_what_is_known_of_effects_goes_with_them(edit, effect):
-    scene = effect.scene.session_uid
-    invalidation.invalidate_changed(edit)
-    assert "invalidation" in remembering(scene)
-    edit.sequence_editor.strips.remove(next(strip for strip in edit.sequence_editor.strips if strip.type == "SCENE"))
-    reconcile.update()
-    invalidation.invalidate_changed(edit)
-    assert remembering(scene) <= {"invalidation"}  # a number for each scene of the session
 
 
 def test_a_file_replaced_in_the_middle_is_rendered(bpy, edit, effect, render, images):

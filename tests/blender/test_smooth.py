@@ -12,9 +12,9 @@ from made_recipes import made
 from standin import Between, moments, spread
 from support import image_strip, picture_of, request, write_frames
 
-from shutter_addon.blender.data import consistency, fcurves, preview_areas, snapshot, source_media
+from shutter_addon.blender.data import consistency, fcurves, preview_areas, snapshot
 from shutter_addon.blender.editing import add_effect, bar_edits, shutter_edits
-from shutter_addon.blender.rendering import effect_source, invalidation, previews, render_job, sessions, smooth_previews
+from shutter_addon.blender.rendering import effect_source, previews, render_job, sessions, smooth_previews
 from shutter_addon.core.frames import light
 from shutter_addon.media import flow, open_source, smooth
 
@@ -126,18 +126,6 @@ def test_a_slow_strip_shows_moments(film, add, edit, render, same_pixels):
     for frame, picture in render(edit, (3, 8)).items():
         same_pixels(picture[..., :3], light.to_encoded(frames[found[frame]]) * 255, 1)
         assert abs(found[frame] - (frame - 1)) <= 1
-
-
-def test_a_file_that_was_replaced_is_shown(film, add, edit):
-    """With the moments beside it, when a render begins."""
-    first, _ = film
-    *_, effect = add(first, np.ones(2))
-    before = picture_of(effect.scene, 2)
-    invalidation.invalidate_changed(edit)
-    (first.parent / "f0003.png").write_bytes((first.parent / "f0009.png").read_bytes())
-    source_media.look_again()
-    assert invalidation.invalidate_changed(edit)
-    assert not np.allclose(picture_of(effect.scene, 2), before)
 
 
 # Still frames

@@ -132,10 +132,10 @@ def test_drawing_never_waits_and_measures_once(add, monkeypatch):
 
 def test_what_is_known_is_forgotten_with_the_file(add, bpy):
     looked(*add(12, np.ones(4)))
-    assert strobing._moved  # nobody else is told what is kept
+    assert strobing._measuring.moved  # nobody else is told what is kept
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-    assert not strobing._moved  # likewise
-    assert not strobing._last_looks  # likewise
+    assert not strobing._measuring.moved  # likewise
+    assert not strobing._measuring.looks  # likewise
 
 
 # The button

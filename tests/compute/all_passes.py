@@ -10,7 +10,6 @@ from shutter_addon.compute import (
     gpu,
     running_sums,
     stages,
-    window,
 )
 from shutter_addon.compute.composition_passes import MODES, composition
 from shutter_addon.core.model.frame_state import AVERAGE, Combine
@@ -78,9 +77,9 @@ def _combining():
                     own = quads if each != "search" else 1
                     light = _light(1, False, False, at == (False, False), combine=combine)
                     yield _moved(each, light, own, packed, at, EDGES=2)
-    yield composition_passes.selection(2, 9)
-    for begins, levels in ((True, False), (False, False), (False, True)):
-        yield composition_passes.way_sum(begins, levels)
+    yield read_pass("ways", "SELECT", GROUPS=2, ALL=9)
+    for begins, levels in ((1, 0), (0, 0), (0, 1)):
+        yield read_pass("ways", BEGINS=begins, LEVELS=levels)
 
 
 def _layers():
@@ -101,8 +100,8 @@ def _layers():
 def _filling():
     for tiled, sent in itertools.product((True, False), ("COLOURS", "NUMBERS", "PLANES", "MOMENT", "AGAIN")):
         yield running_sums.accumulation(1, sent, tiled, tiled)
-    yield window.packing(1, True)
-    yield window.packing(2, False)
+    yield read_pass("pack", DECODE=1, SQUARED=1)
+    yield read_pass("pack", DECODE=2, SQUARED=0)
     yield read_pass("matte_blend", COUNT=2, MOST=stages.MOST_MATTES)
 
 
@@ -111,7 +110,7 @@ def _unpacking():
         from shutter_addon.blender.devices import blender_gpu
 
         for kind, (_, _, packing) in blender_gpu.FORMATS.items():
-            yield blender_gpu.unpacking(kind, packing)
+            yield read_pass("blender_gpu", "UNPACK", PACKING=packing, FORMAT=kind)
         yield blender_gpu.LETTING_GO
 
 

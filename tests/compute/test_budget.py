@@ -1,7 +1,6 @@
 """Memory of a GPU within a budget: every smaller way gives the same picture, and what was taken is given back."""
 
 from dataclasses import replace
-from pathlib import Path
 from unittest import mock
 
 import numpy as np
@@ -149,24 +148,17 @@ def test_smaller_ways_show_the_same(limited, options):
     assert np.array_equal(sent, resident)
 
 
-@pytest.mark.parametrize("dtype", [np.uint8, np.float16])
-def test_what_follows_fits_too(limited, dtype):
-    source = film(dtype=dtype, transfer="linear" if dtype != np.uint8 else "srgb")
-    rng = np.random.default_rng(5)
+@pytest.mark.parametrize("kind", ["follows", "follows in floats", "mattes"])
+def test_what_follows_and_mattes_fit_too(limited, kind):
+    source, reader = film(**({"dtype": np.float16, "transfer": "linear"} if "floats" in kind else {})), None
+    rng, room = np.random.default_rng(5), 96
     shown = [following(rng, source, moment(), (0, 1)) for _ in range(2)]
-    roomy, _, _ = rendered(limited(ROOMY), source, shown)
-    small, _, is_short = rendered(limited(PIXELS * 96), source, shown)
+    if kind == "mattes":
+        shown, reader, room = [replace(moment(), mattes=mattes(rng, 3))] * 2, Values(source), HOST
+    roomy, _, _ = rendered(limited(ROOMY), source, shown, reader)
+    small, _, is_short = rendered(limited(PIXELS * room), source, shown, reader)
     assert is_short
     assert np.abs(small - roomy).max() <= 2**-14  # sums of other parts
-
-
-def test_mattes_fit_too(limited):
-    source = film()
-    shown = [replace(moment(), mattes=mattes(np.random.default_rng(6), 3))] * 2
-    roomy, _, _ = rendered(limited(ROOMY), source, shown, Values(source))
-    small, _, is_short = rendered(limited(PIXELS * HOST), source, shown, Values(source))
-    assert is_short
-    assert np.abs(small - roomy).max() <= 2**-14
 
 
 def test_several_effects_take_turns_and_show_the_same(limited):
@@ -258,16 +250,9 @@ def test_what_is_allowed(monkeypatch):
     assert devices.allowed(48 << 30) == 36 << 30
 
 
-def test_the_machines_memory():
-    lines = Path("/proc/meminfo").read_text().splitlines()
-    kilobytes = next(int(line.split()[1]) for line in lines if line.startswith("MemTotal"))
-    assert devices.machine_memory() == kilobytes << 10
-
-
 def test_a_device_tells_what_there_is(kind):
-    """A software renderer has the machine's memory, a GPU may have less of its own; a limit that was set stays."""
-    for given, wanted in ((None, devices.allowed(devices.machine_memory())), (5, 5)):
-        device = kind(Budget(given))
-        assert device.budget.limit == wanted or (given is None and "llvmpipe" not in device.name)
-        assert devices.MEGABYTE < device.budget.limit <= wanted or given
-        device.release()
+    """A software renderer has the machine's memory, a GPU may have less of its own."""
+    wanted, device = devices.allowed(devices.machine_memory()), kind()
+    assert device.budget.limit == wanted or "llvmpipe" not in device.name
+    assert devices.MEGABYTE < device.budget.limit <= wanted
+    device.release()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from shutter_addon.compute import cpu, running_sums, window
+from shutter_addon.compute import cpu, window
 from shutter_addon.compute.cpu import CPUCompositor
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer, open_compositor
@@ -14,6 +14,7 @@ from shutter_addon.core.model import shutters, windows
 from shutter_addon.core.model.frame_state import FrameState, Options
 from shutter_addon.core.model.scribbles import Shape
 from shutter_addon.core.pixels import compositor
+from shutter_addon.devices import llvmpipe
 
 LEVEL = 1 / 255
 
@@ -80,7 +81,7 @@ def composed(device, source, moment, index, direction=1, shot=None, mattes=None)
     moves = moment.following and moment.following.at(indices)
     expected = compositor.compose(moment, source.linear()[np.maximum(indices, 0)], indices >= 0, c, moves)
     assert picture.shape == expected.shape
-    renderer.release_window()
+    renderer.release()
     return picture, expected
 
 
@@ -130,13 +131,6 @@ def test_tiles(monkeypatch, tile, made, block):
     monkeypatch.setattr(cpu, "TILE", tile)
     for options in ({}, {"edges": "shorten"}, {"interpolation": "value"}):
         check(CPUCompositor(), footage(rng), made(rng, aggregate=block, exposure="weighted", **options), 12)
-
-
-@pytest.mark.parametrize("count", [8, 9])
-def test_number_of_shutters(device, count):
-    rng = np.random.default_rng(7)
-    shapes = tuple(Shape(i, "line", 0.05, (np.array([[i / count, 0.1], [i / count, 0.8]]),)) for i in range(count))
-    check(device, footage(rng, size=(64, 40)), state(rng, count=count, shapes=shapes), 0)
 
 
 def far_apart(rng, count, window, **options):
@@ -218,21 +212,6 @@ def test_a_picture_stays_on_the_device(gpu_device):
     assert np.array_equal(pixels, other.picture(Request(3, moment)))
 
 
-@pytest.mark.parametrize("shapes", [SHAPES, SHAPES[:1], ()])
-@pytest.mark.parametrize("block", [1, 2])
-def test_coefficients_stay_on_the_device(gpu_device, shapes, block):
-    rng = np.random.default_rng(19)
-    source, moment = footage(rng), state(rng, shapes=shapes, count=6, aggregate=block)
-    renderer = Renderer(GPUCompositor(gpu_device), source)
-    texture, size = renderer.drawn_coefficients(Request(0, moment))
-    with gpu_device.current():
-        layers = gpu_device.read(texture)
-    values = np.moveaxis(layers, -1, 1).reshape(-1, *layers.shape[1:3])[:6]
-    y, x = np.mgrid[: source.height, : source.width]
-    expected = renderer.coefficients(Request(0, moment))[:, y // block, x // block]
-    assert np.array_equal(values[:, y // size, x // size], expected)
-
-
 def test_no_new_solve_when_nothing_moved(device, monkeypatch):
     rng = np.random.default_rng(13)
     solves = []
@@ -253,7 +232,7 @@ def test_no_new_solve_when_nothing_moved(device, monkeypatch):
 @pytest.mark.parametrize("size", [(37, 23), (1, 1), (70, 33)])
 def test_sums_lie_in_tiles_only_where_textures_are_rows(monkeypatch, rows, size):
     """And pictures are right both ways, in bands as well: software renderers have the tiles, GPUs have not."""
-    monkeypatch.setattr(running_sums, "stores_rows", lambda device: rows)
+    monkeypatch.setattr(llvmpipe, "is_llvmpipe", lambda name: rows)
     monkeypatch.setattr(window, "BAND_BYTES", size[0] * 8 * 17 * 32)
     rng = np.random.default_rng(20)
     device, source = open_compositor("gpu"), footage(rng, size=size)
@@ -270,7 +249,7 @@ def test_sums_lie_in_tiles_only_where_textures_are_rows(monkeypatch, rows, size)
 
 
 def test_a_window_too_long_or_a_picture_too_high_for_tiles_has_none(monkeypatch):
-    monkeypatch.setattr(running_sums, "stores_rows", lambda device: True)
+    monkeypatch.setattr(llvmpipe, "is_llvmpipe", lambda name: True)
     device, source = open_compositor("gpu"), footage(np.random.default_rng(21), count=3, size=(37, 65))
     rows_of_tiles = -(-source.height // 16)
     with device.current():

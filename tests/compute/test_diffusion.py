@@ -42,10 +42,6 @@ def edge_lines(width=300, height=200):
     return labels, 2
 
 
-def rings_within_rings():
-    return rasterise([circle(i % 4, 0.5, 0.5, 0.45 - 0.07 * i) for i in range(6)], 320, 180), 4
-
-
 def touching_lines():
     """Pairs of 1-px lines side by side, of different shutters, with loose ends."""
     labels = blank(320, 180)
@@ -61,42 +57,16 @@ def wall(width=640, height=90, x=255):
     return labels, 2
 
 
-def diagonals():
-    labels = blank(320, 180)
-    k = np.arange(150)
-    labels[15 + k, 20 + k], labels[15 + k, 21 + k], labels[15 + k, 120 + k] = 1, 3, 2
-    return labels, 3
-
-
 def dots(count=12, shutters=5, seed=0):
     labels, rng = blank(320, 180), np.random.default_rng(seed)
     labels[rng.integers(0, 180, count), rng.integers(0, 320, count)] = 1 + np.arange(count) % shutters
     return labels, shutters
 
 
-def corners(width=257, height=129):
-    labels = blank(width, height)
-    labels[0, 0], labels[-1, -1] = 1, 2
-    return labels, 2
-
-
-def neighbours():
-    labels = blank(320, 180)
-    labels[90, 160:162] = 1, 2
-    return labels, 2
-
-
 def hole_in_a_wall():
     labels = blank(320, 180)
     labels[:, 160], labels[:, 0], labels[:, -1], labels[40:140, 80] = 1, 2, 3, 1
     labels[90, 160] = labels[60, 80] = 0
-    return labels, 3
-
-
-def dashes(off):
-    labels = blank(320, 180)
-    labels[np.arange(180) % (off + 1) == 0, 160] = 1
-    labels[:, 5], labels[::7, 250] = 2, 3
     return labels, 3
 
 
@@ -149,15 +119,10 @@ def lattice(across, down, at, seed, width=192, height=120, size=(1, 1), kept=1.0
 # Even cells are those of the coarser grids; pictures of even sizes end beyond the last of them.
 EVENS = ((2, 4), (4, 2), (4, 4), (2, 8), (8, 8))
 LATTICES = [(pitch, at, (1, 1), 1.0) for pitch in EVENS for at in ((0, 0), (1, 0))] + [
-    ((4, 4), (2, 2), (1, 1), 1.0),
-    ((8, 8), (2, 2), (1, 1), 1.0),
     ((16, 8), (10, 0), (1, 1), 1.0),
     ((20, 6), (18, 2), (1, 1), 0.7),
-    ((16, 16), (0, 0), (1, 1), 1.0),
-    ((4, 4), (0, 0), (1, 3), 1.0),
     ((4, 4), (0, 0), (3, 1), 1.0),
     ((4, 6), (0, 0), (1, 3), 1.0),
-    ((2, 4), (0, 0), (1, 1), 0.5),
     ((4, 4), (0, 0), (1, 1), 0.3),
     ((12, 4), (5, 3), (3, 3), 1.0),
 ]
@@ -172,15 +137,10 @@ def enclosed():
 SCENES = {
     "four lines and a ring": four_lines_and_a_ring(),
     "edge lines": edge_lines(),
-    "rings": rings_within_rings(),
     "touching": touching_lines(),
     "wall": wall(),
-    "diagonals": diagonals(),
     "dots": dots(),
-    "corners": corners(),
-    "neighbours": neighbours(),
     "hole": hole_in_a_wall(),
-    "dashes": dashes(3),
     "spiral": spiral(3),
     "maze": maze(5),
     "random, 9": random_shapes(3, shutters=9, count=20),
@@ -231,16 +191,11 @@ def test_blenders_gpu_solves_the_same(scene, on_moderngl, on_blender):
     np.testing.assert_allclose(on_blender(labels, count), on_moderngl(labels, count), rtol=0, atol=LEVEL / 100)
 
 
-@pytest.mark.parametrize(("pitch", "at", "size", "kept"), LATTICES)
-def test_dots_anywhere_are_exact(on_moderngl, pitch, at, size, kept):
-    labels, count = lattice(*pitch, at, 1, size=size, kept=kept)
-    np.testing.assert_allclose(on_moderngl(labels, count), exact(labels, count), rtol=0, atol=LEVEL)
-
-
-def test_a_large_lattice(on_moderngl):
-    """The larger the picture, the more grids lose what lies on their coarse cells."""
-    labels, count = lattice(8, 8, (0, 0), 2, 640, 360)
-    np.testing.assert_allclose(on_moderngl(labels, count), exact(labels, count), rtol=0, atol=LEVEL)
+def test_dots_anywhere_are_exact(on_moderngl):
+    """And in a large picture: the larger, the more grids lose what lies on their coarse cells."""
+    scenes = [lattice(*pitch, at, 1, size=size, kept=kept) for pitch, at, size, kept in LATTICES]
+    for labels, count in (*scenes, lattice(8, 8, (0, 0), 2, 640, 360)):
+        np.testing.assert_allclose(on_moderngl(labels, count), exact(labels, count), rtol=0, atol=LEVEL)
 
 
 @settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -306,11 +261,3 @@ def test_moved_scribbles_start_from_the_last_solution(on_moderngl):
         got = on_moderngl(labels, count, warm=True)
         assert_coefficients(got, count, labels.shape)
         np.testing.assert_allclose(got, exact(labels, count), rtol=0, atol=LEVEL)
-
-
-def test_a_start_from_anything_comes_to_the_same(on_moderngl):
-    labels, count = SCENES["random, 9"]
-    on_moderngl(labels[::-1], count)
-    for _ in range(3):
-        got = on_moderngl(labels, count, warm=True)
-    np.testing.assert_allclose(got, exact(labels, count), rtol=0, atol=LEVEL)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from shutter_addon.compute.cpu import CPUCompositor
-from shutter_addon.compute.gpu import Displaying
+from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.core.pixels.shown_levels import Display, rounded
 from shutter_addon.media import color
 
@@ -25,19 +25,18 @@ def pictures():
 @pytest.mark.parametrize("dither", [0.0, 1.0, 2.0])
 def test_levels_are_the_displays(gpu_device, transfer, dither):
     display = Display(dither, TRANSFERS[transfer])
+    compositor = GPUCompositor(gpu_device)
     with gpu_device.current():
-        displaying = Displaying(gpu_device)
         for light in pictures():
             height, width, _ = light.shape
             picture = gpu_device.texture(width, height, 1, "rgba32f")
             gpu_device.write(picture, light)
-            found = displaying.levels(picture, display)
+            found = compositor.shown(picture, display)
             expected = rounded(display.transfer(light[..., :3]) + display.noise(width, height)[..., None])
             assert np.array_equal(found[::-1, :, :3], expected)
             assert (found[..., 3] == 255).all()
             assert np.array_equal(CPUCompositor().shown(light[::-1], display), found)
             picture.release()
-        displaying.release()
 
 
 def test_the_display_is_asked_about_few_pixels(gpu_device):
@@ -51,14 +50,13 @@ def test_the_display_is_asked_about_few_pixels(gpu_device):
 
         display = Display(1.0, counting)
         with gpu_device.current():
-            displaying = Displaying(gpu_device)
+            compositor = GPUCompositor(gpu_device)
             picture = gpu_device.texture(light.shape[1], light.shape[0], 1, "rgba32f")
             gpu_device.write(picture, light)
-            displaying.levels(picture, display)
+            compositor.shown(picture, display)
             asked.clear()
-            displaying.levels(picture, display)
+            compositor.shown(picture, display)
             picture.release()
-            displaying.release()
         assert 0 < sum(asked) < light.size / 50
 
 

@@ -41,7 +41,7 @@ def compared(device, source, moment, index, direction=1):
     renderer = Renderer(device, source)
     asked = Request(index, moment, direction)
     picture, mix = renderer.picture(asked), renderer.coefficients(asked).astype(float)
-    renderer.release_window()
+    renderer.release()
     frames = np.stack([source.read(k) for k in range(source.count)])
     moment = windows.slid(moment, index, direction, range(source.count))
     indices = windows.indices(moment.options, index, range(source.count), direction)
@@ -95,7 +95,7 @@ def test_across_repeated_frames(device, steps):
     for index in (0, steps, 2 * steps, 2 * steps + 1, 4 * steps, 5 * steps, 6 * steps - 1, steps):
         own = Renderer(device, repeating(steps))
         np.testing.assert_array_equal(kept.picture(Request(index, moment)), own.picture(Request(index, moment)))
-        own.release_window()
+        own.release()
     alone = FrameState(Options(1, step=steps), np.ones((1, 1)))
     for shown, frames in ((moment, (1, 2, 4, 6)), (alone, (2, 5, 6))):
         for index in frames:

@@ -60,11 +60,6 @@ def walls(gap, width=WIDTH, height=HEIGHT, thick=1):
     return grey((y % gap < thick) | (x % gap < thick))
 
 
-def checks(size, width=WIDTH, height=HEIGHT):
-    y, x = np.mgrid[:height, :width]
-    return grey((x // size + y // size) % 2)
-
-
 def spiral(gap, side=64):
     picture, a, b = np.zeros((side, side)), 0, side - 1
     while b - a > 2 * gap:
@@ -86,11 +81,6 @@ def three_corners(side=64):
     labels = np.zeros((side, side), np.uint16)
     labels[side // 2, side // 2], labels[3, 3], labels[3, -4] = 1, 2, 3
     return labels
-
-
-def blobs(size, seed=3):
-    random = np.random.default_rng(seed).random((HEIGHT, WIDTH)).astype(np.float32)
-    return grey(cv2.GaussianBlur(random, (0, 0), size) > 0.5)
 
 
 def one_stroke():
@@ -117,14 +107,6 @@ def scattered(share, shutters=3, width=WIDTH, height=HEIGHT):
     return labels.astype(np.uint16)
 
 
-def fixed_walls():
-    """Scribbles of one pixel that cut the picture into cells, with gaps."""
-    labels = np.zeros((HEIGHT, WIDTH), np.uint16)
-    labels[::9], labels[:, ::11] = 1, 2
-    labels[::9, 5::22] = 0
-    return labels
-
-
 def pockets(side, width=160, height=120, seed=5):
     """Free pockets of side × side pixels in all else, which is fixed."""
     y, x = np.mgrid[:height, :width]
@@ -145,9 +127,7 @@ X = np.arange(WIDTH) / WIDTH + np.zeros((HEIGHT, 1))
 SCENES = {
     "bunny": (shapes(1), 4, film(*BUNNY)),
     "bunny, one stroke": (one_stroke(), 2, film(*BUNNY)),
-    "people, sharp": (dots(), 5, film(*PEOPLE, blur=0.3)),
     "people, 8 shutters": (shapes(5, 8, count=16), 8, film(*PEOPLE)),
-    "walkers and noise": (dots(), 5, film(*WALKERS) + noise(0.02) - np.float32(0.5)),
     "walkers, 9 shutters": (dots(9, 30), 9, film(*WALKERS)),
     "flat": (shapes(7), 4, grey(X * 0)),
     "noise": (shapes(7), 4, noise(0.3)),
@@ -155,24 +135,15 @@ SCENES = {
     "specks": (dots(4, 5, 169, 50), 4, specks(0.2, 0.1, 169, 50)),
     "walls, 3": (dots(), 5, walls(3)),
     "walls, 8": (dots(), 5, walls(8)),
-    "thick walls": (shapes(8), 4, walls(16, thick=2)),
-    "rows": (dots(), 5, grey(np.arange(HEIGHT)[:, None] % 2 + X * 0)),
-    "checks, 3": (dots(), 5, checks(3)),
-    "diagonals": (dots(), 5, grey(np.add.outer(np.arange(HEIGHT), np.arange(WIDTH)) // 5 % 2)),
     "spiral": (three_corners(), 3, spiral(7)),
     "narrow maze": (three_corners(), 3, maze(2)),
-    "blobs": (dots(), 5, blobs(4)),
-    "ramps": (shapes(9), 4, grey(X * 6 % 1)),
     "enclosed": (ring_of_a_shutter(), 2, film(*BUNNY)),
     "half of it fixed": (scattered(0.5), 3, noise(0.3)),
-    "walls of scribbles": (fixed_walls(), 2, film(*BUNNY)),
     "single free pixels": (pockets(1), 3, noise(0.3, 160, 120)),
     "pockets in halves": (pockets(7), 3, halves(7)),
     "pockets with noise": (pockets(12), 3, noise(0.03, 160, 120)),
-    "a band": (shapes(10, 3, 320, 40), 3, film(*PEOPLE, 320, 40)),
     "odd": (shapes(11, 4, 97, 61), 4, film(*WALKERS, 97, 61)),
     "1×97": (scattered(0.03, 3, 1, 97), 3, noise(0.3, 1, 97)),
-    "2×3": (scattered(0.0, 3, 2, 3), 3, noise(0.3, 2, 3)),
 }
 
 

@@ -183,7 +183,7 @@ def test_in_betweens_that_guide_are_needed():
 
     def needed(index, moment):
         renderer.shot(Request(index, moment))  # which finds the cuts
-        renderer.release_window()
+        renderer.release()
         return renderer.missing(Request(index, moment))
 
     assert needed(42, still) == {42}

@@ -106,7 +106,7 @@ def test_two_renderers_at_once(device):
     moments = [replace(moment, mattes=mattes(rng, 2)) for _ in renderers]
     expected = [renderer.picture(Request(2, moment)) for renderer, moment in zip(renderers, moments, strict=True)]
     for renderer, moment, picture in zip(renderers * 2, moments * 2, expected * 2, strict=True):
-        renderer.release_window()
+        renderer.release()
         assert np.array_equal(renderer.picture(Request(2, moment)), picture)
 
 

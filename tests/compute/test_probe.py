@@ -47,23 +47,3 @@ def test_beside_the_picture_there_is_nothing(request_of, point):
     from shutter_addon.blender.interface.probe_gizmo import probed_at
 
     assert probed_at(*request_of(state(np.random.default_rng(0))), point) is None
-
-
-def test_what_takes_the_place_of_what_lies_behind_layers(blender_device):
-    from test_layered import COUNT, SHOWN, SIZE, with_layers
-
-    from shutter_addon.media.matte_values import MatteValues
-
-    rng, matte = np.random.default_rng(4), np.zeros((COUNT, *SIZE[::-1]))
-    matte[: SHOWN + 8, :12] = 1
-    moment, _ = with_layers(state(rng, window=4, shapes=()), matte, opacities=(0.97,))
-    renderer = Renderer(GPUCompositor(blender_device), footage(rng, COUNT, SIZE), MatteValues(*SIZE))
-    request = Request(SHOWN, moment)
-    renderer.picture(request)
-    with renderer.compositor.current():
-        texture, block = renderer.drawn_holes(request)
-        assert np.array_equal(renderer.compositor.device.read(texture)[0, ..., 0], renderer.holes)
-    assert block == 1
-    without = Request(SHOWN, state(rng, window=4, shapes=()))
-    texture, block = renderer.drawn_holes(without)
-    assert (texture.size[:2], block) == ((1, 1), max(SIZE))

@@ -89,7 +89,7 @@ def test_what_was_shown_before_leaves_no_trace(device):
         fresh = Renderer(device, ShotSource(film(size=(17, 9))))
         assert np.array_equal(renderer.picture(asked), fresh.picture(asked))
         assert np.array_equal(renderer.coefficients(asked), fresh.coefficients(asked))
-        fresh.release_window()
+        fresh.release()
 
 
 def test_within_a_shot_every_frame_is_decoded_once(device):
@@ -170,32 +170,13 @@ def test_what_is_missing_is_what_is_read(device, edges, position, edge_aware):
     renderer = Renderer(device, ShotSource(source))
     for index in range(22):
         renderer.shot(Request(index, moment))  # which finds the cuts
-    renderer.release_window()
+    renderer.release()
     for index, direction in ((5, 1), (9, -1), (20, 1)):
         source.reads.clear()
         missing = renderer.missing(Request(index, moment, direction))
         renderer.picture(Request(index, moment, direction))
         assert set(source.reads) == missing
-        renderer.release_window()
-
-
-def test_a_frame_that_cannot_be_read_is_missed_only_where_it_is_shown(device):
-    from shutter_addon.media import MediaError
-
-    source = film()
-    read = source.read
-
-    def fail(index):
-        if index == 5:
-            raise MediaError("broken")
-        return read(index)
-
-    source.read = fail
-    last = FrameState(Options(5), np.eye(5)[4:])
-    renderer = Renderer(device, ShotSource(source))
-    renderer.picture(Request(2, last))
-    with pytest.raises(MediaError, match="broken"):
-        renderer.picture(Request(1, last))
+        renderer.release()
 
 
 @pytest.mark.parametrize(("edges", "brightness"), [("hold", 1.0), ("mirror", 0.25), ("shorten", 1.0), ("slide", 0.25)])
@@ -215,7 +196,7 @@ def test_moments_show_nothing_of_the_next_shot(device, edges, brightness):
     for index in (4 * STEP, 5 * STEP, 6 * STEP):
         first, second = (Renderer(device, source(seed)) for seed in (1, 2))
         picture = first.picture(Request(index, moment)).copy()
-        first.release_window()
+        first.release()
         np.testing.assert_array_equal(second.picture(Request(index, moment)), picture)
         assert first.source.around(index, 0, 40).stop == BETWEEN[1]
-        second.release_window()
+        second.release()

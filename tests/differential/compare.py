@@ -94,7 +94,7 @@ def check(case: Case, devices: dict, folder: Path) -> dict:
             made, mix = renderer.picture(asked), renderer.coefficients(asked)
             own = {frame: renderer.layer_mattes(asked, frame) for frame in layers}
             with device.current():
-                renderer.release_window()
+                renderer.release()
             right = picture(recipe, case.frame, footage, index, direction, mix, layers=own)
             found[name] = judge(case, name, folder, made, right, mix, exact)
             for frame, values in layers.items():

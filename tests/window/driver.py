@@ -46,6 +46,11 @@ def video_editing_opened():
     enable()
 
 
+def composing(previews):
+    """Whether a first or a better picture is being made."""
+    return previews.looking.slices.last is not None or previews.smooth_previews.is_busy()
+
+
 def play(story, seconds=STEP):
     """Runs a story step by step; quits Blender with its end or its first failure."""
     OUT.mkdir(parents=True, exist_ok=True)
@@ -58,7 +63,7 @@ def play(story, seconds=STEP):
             return 0.01
         # What comes next is done with what a picture looks like; a window that goes on shows it later.
         previews = sys.modules.get(PREVIEWS)
-        is_composing = previews and previews.is_composing() and not previews.may_be_late()
+        is_composing = previews and composing(previews) and not previews.may_be_late()
         del previews  # a module that is held would be taken for one that outlives the extension
         if is_composing:
             return 0.01

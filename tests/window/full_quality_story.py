@@ -116,7 +116,7 @@ def composed_late():
         yield from driver.until(lambda frame=frame: story.edit().frame_current == frame + 1, "the playhead moves")
         yield from driver.until(lambda: late(said), "it says so of this frame as well")
         previews._SLICE = previews.looking.slices.seconds = first  # as it was
-        yield from driver.until(lambda: not previews.is_composing(), "the picture comes", 60)
+        yield from driver.until(lambda: not driver.composing(previews), "the picture comes", 60)
         yield from driver.until(lambda: not late(said), "nothing is late")
     driver.PREVIEWS, preview._Notes = name, notes  # as they were
     story.edit().frame_set(FRAME)

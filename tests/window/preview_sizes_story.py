@@ -163,7 +163,7 @@ def kept_time():
     edit, drawn = story.edit(), []
 
     def note():
-        ((_snapshot, _frame, request),) = sessions().WINDOW._requests.values()  # what was drawn, as above
+        ((_snapshot, _frame, request),) = sessions().WINDOW.requests.values()  # what was drawn, as above
         drawn.append((time.perf_counter(), edit.frame_current, request.index))
 
     kept, edit.sync_mode = edit.sync_mode, "FRAME_DROP"

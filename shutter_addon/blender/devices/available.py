@@ -2,15 +2,16 @@
 
 import threading
 from collections.abc import Callable
-from functools import cache, partial
+from functools import cache
 from typing import NamedTuple
 
 import bpy
 import gpu
 from bpy.app.translations import pgettext_rpt as rpt_
 
+from ...compute.cpu import CPUCompositor
 from ...compute.gpu import GPUCompositor
-from ...compute.renderer import open_compositor, open_gl
+from ...compute.renderer import open_gl
 from ...compute.request import Compositor
 from ...core import threads
 from ...devices.device import NoDeviceError
@@ -20,10 +21,10 @@ from .main_thread import RelayedDevice
 CHOICES = ("auto", "gpu", "opengl", "blender", "cpu")  # gpu: opengl, else blender
 # What opens each device. Arguments: a Budget and `ask_others`, as for Device.
 OPEN: dict[str, Callable[..., Compositor]] = {
-    "opengl": partial(open_compositor, "gpu"),
+    "opengl": lambda *memory: GPUCompositor(open_gl(*memory)),
     "blender": lambda *memory: GPUCompositor(BlenderDevice(*memory)),
     "relayed": lambda *memory: GPUCompositor(RelayedDevice(*memory)),  # Blender's GPU, from the thread of a job
-    "cpu": partial(open_compositor, "cpu"),
+    "cpu": lambda *_memory: CPUCompositor(),
 }
 
 
@@ -52,7 +53,9 @@ def choose(wanted: str, *, window_waits: bool = False) -> tuple[str, str | None]
             lacking.append(
                 rpt_("View > Render Sequencer Animation cannot use Blender's own GPU, as Render > Render Animation can")
             )
-        elif not bpy.app.background or _blender_in_background():
+        elif not bpy.app.background or (
+            threading.current_thread() is threading.main_thread() and opens_in_background()
+        ):
             way = "blender" if bpy.app.background else "relayed"
             return way, f"{lacking[0]}; composing on Blender's own GPU, {name(way)}" if wanted == "auto" else None
         else:
@@ -90,7 +93,3 @@ def _tried() -> OpenGL:
         return OpenGL(lacking=str(error))
     device.release()
     return OpenGL(device.name, device.budget.limit)
-
-
-def _blender_in_background() -> bool:
-    return threading.current_thread() is threading.main_thread() and opens_in_background()

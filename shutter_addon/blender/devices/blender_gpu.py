@@ -20,7 +20,7 @@ import gpu
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...devices.device import Budget, Device, NoDeviceError, Texture, machine_memory, texel_bytes
+from ...devices.device import Budget, Device, NoDeviceError, Texture, allowed, machine_memory, texel_bytes
 from ...devices.llvmpipe import is_llvmpipe
 from ...devices.passes import Pass, read_pass
 
@@ -28,7 +28,7 @@ TYPES = {"sampler2DArray": "FLOAT_2D_ARRAY", "usampler2DArray": "UINT_2D_ARRAY"}
 _AS_IT_IS, _WHOLE, _OPAQUE_BYTES, _PAIRS_OF_BYTES, _SIXTEEN_BITS = range(5)
 # GLSL format: NumPy's type, the format that is sent, how it is unpacked (UNPACK). Only passes use rgba16ui and
 # rgba32ui: floats cannot hold them, and Blender reads whole numbers only of one component.
-FORMATS = {
+FORMATS: dict[str, tuple] = {
     "rgba8": (np.uint8, "RG32F", _PAIRS_OF_BYTES),
     "rgba16": (np.uint16, "RGBA32F", _SIXTEEN_BITS),
     "rgba16f": (np.float16, "RGBA32F", _AS_IT_IS),
@@ -81,13 +81,13 @@ class BlenderDevice(Device):
     """
 
     def __init__(self, budget: Budget | None = None, ask_others: Callable[[], None] | None = None) -> None:
-        super().__init__(budget, ask_others)
+        self.name = gpu.platform.renderer_get()
+        memory = machine_memory() if is_llvmpipe(self.name) else None
+        super().__init__(budget or Budget(allowed(memory)), ask_others)
         self._shaders: dict[Pass, gpu.types.GPUShader] = {}
         self._spare: Texture | None = None
-        self.name = gpu.platform.renderer_get()
         self.max_layers = gpu.capabilities.max_texture_layers_get()
         self.max_size = gpu.capabilities.max_texture_size_get()
-        self.budget.tell(machine_memory() if is_llvmpipe(self.name) else None)
 
     def current(self) -> AbstractContextManager[BlenderDevice]:
         """See Device."""
@@ -116,24 +116,22 @@ class BlenderDevice(Device):
         self.run(LETTING_GO, (1, 1), textures=spares, images=spares, layer=0)
 
     def _make(self, width: int, height: int, layers: int, kind: str) -> gpu.types.GPUTexture:
-        try:
-            return gpu.types.GPUTexture((width, height), layers=layers, format=kind.upper())
-        except RuntimeError as error:
-            raise NoDeviceError(str(error)) from None
+        return _new((width, height), kind.upper(), layers=layers)
 
     def _free(self, own: gpu.types.GPUTexture) -> None:
         free(own)
 
     def write(self, texture: Texture, array: np.ndarray, layer: int = 0, *, opaque: bool = False) -> None:
         height, width = array.shape[:2]
-        _, sent_format, packing = _exchanged(texture)
+        _, sent_format, packing = FORMATS[texture.kind]
         if texture.kind == "rgba8" and opaque:
             sent_format, packing = "R32F", _OPAQUE_BYTES
         rows = max(1, _SENT_BYTES // (width * texel_bytes(sent_format.lower())))
         for top in range(0, height, rows):
             strip = array[top : top + rows]
             sent = (width, len(strip)), sent_format, _buffer("FLOAT", _packed(strip, packing))
-            self._send(texture.gpu, unpacking(texture.kind, packing), sent, top, layer)
+            unpacking = read_pass("blender_gpu", "UNPACK", PACKING=packing, FORMAT=texture.kind)
+            self._send(texture.gpu, unpacking, sent, top, layer)
 
     def send(self, texture: Texture, frame: np.ndarray) -> Texture:
         """See Device. The numbers need no unpacking."""
@@ -141,18 +139,18 @@ class BlenderDevice(Device):
         if width * height * texel_bytes("r32f") > _SENT_BYTES:
             return super().send(texture, frame)
         data = _buffer("FLOAT", _packed(frame, _OPAQUE_BYTES))
-        return Texture(None, (width, height, 1), "r32f", _of_numbers((width, height), "R32F", data))
+        return Texture(None, (width, height, 1), "r32f", _new((width, height), "R32F", data))
 
     def _send(self, stored: gpu.types.GPUTexture, program: Pass, sent: tuple, top: int, layer: int) -> None:
-        """Send numbers and unpack them into a layer. sent: arguments of _of_numbers."""
-        textures, size = {"sent": _of_numbers(*sent)}, sent[0]
+        """Send numbers and unpack them into a layer. sent: arguments of _new."""
+        textures, size = {"sent": _new(*sent)}, sent[0]
         constants = {"size": size, "top": top, "layer": layer}
         BlenderDevice._dispatch(self, program, program.groups(size), textures, {"stored": stored}, {}, constants)
 
     def read(self, texture: Texture) -> np.ndarray:
         """See Device."""
         width, height, layers = texture.size
-        dtype, _, packing = _exchanged(texture)
+        dtype, _, packing = FORMATS[texture.kind]
         components = 4 if texture.kind.startswith("rgba") else 1
         sample, kind = (np.uint32, "UINT") if packing == _WHOLE else (np.float32, "FLOAT")
         array = np.empty((layers, height, width, components), sample)
@@ -229,25 +227,12 @@ def _trial() -> list[str]:
     return [bpy.app.binary_path, *options, "--python-expr", "import gpu; gpu.init()"]
 
 
-def unpacking(kind: str, packing: int) -> Pass:
-    return read_pass("blender_gpu", "UNPACK", PACKING=packing, FORMAT=kind)
-
-
-def _exchanged(texture: Texture) -> tuple:
-    """Return the texture's entry of FORMATS.
-
-    Raises:
-        TypeError: Blender neither sends nor reads such a texture. It would read nothing, without an error.
-    """
-    if texture.kind not in FORMATS:
-        raise TypeError(f"on Blender's GPU only passes read and write textures of {texture.kind}")
-    return FORMATS[texture.kind]
-
-
-def _of_numbers(size: tuple[int, int], kind: str, data: gpu.types.Buffer) -> gpu.types.GPUTexture:
-    """Return a texture of numbers. Raise NoDeviceError if the GPU has no room for it."""
+def _new(
+    size: tuple[int, int], kind: str, data: gpu.types.Buffer | None = None, layers: int = 1
+) -> gpu.types.GPUTexture:
+    """Return a texture, filled with numbers. Raise NoDeviceError if the GPU has no room for it."""
     try:
-        return gpu.types.GPUTexture(size, layers=1, format=kind, data=data)
+        return gpu.types.GPUTexture(size, layers=layers, format=kind, data=data)
     except RuntimeError as error:
         raise NoDeviceError(str(error)) from None
 

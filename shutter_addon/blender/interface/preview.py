@@ -45,12 +45,6 @@ VIEWS = (
     ("EDGES", "Edges", "The result with a line around the area of each shutter"),
     ("SCRIBBLES", "Scribbles", "The source with the strokes of each shutter"),
     ("COEFFICIENTS", "Mattes", "Each pixel's share of each shutter, in the shutters' colors and patterns"),
-    (
-        "HOLES",
-        "Holes",
-        "The result and the holes behind layers: orange is taken from another frame, "
-        "purple is filled from its surroundings",
-    ),
 )
 
 
@@ -67,7 +61,6 @@ def _redraw_when_still() -> float | None:
     return None
 
 
-_HOLES = (1.0, 0.55, 0.0), (0.75, 0.2, 0.9)  # colors of compute.plates.TAKEN and FILLED
 Colors = Sequence[Sequence[float]]  # display values
 _NAVIGATION = 56  # interface units: Blender's navigation buttons at the right of a preview
 _TICK = 0.25  # seconds
@@ -135,7 +128,7 @@ def _draw() -> None:
         _show_sharp(context, preview_areas.shown(context, space.display_channel))
     # Our picture would cover the stroke under the pen; Blender's own picture shows the same.
     if previews.pen_is_down():
-        previews.was_drawn()
+        previews.looking.slices.end()
         previews.refine()
         return
     say = _Notes(context.region)
@@ -148,7 +141,7 @@ def _draw() -> None:
             _show(context, shown, decision, say)
         else:
             previews.looking.whole = None
-            previews.was_drawn()
+            previews.looking.slices.end()
             _tell_unseen(context, say)
         try:
             previews.refine()
@@ -180,7 +173,7 @@ def _show(context: Context, shown: Shown, decision: Decision | None, say: "_Note
             _show_strokes(context, quad, shown, wanted.decision.snapshot)
             main_thread.later(preview_areas.redraw)
     except effect_source.FAULTS as error:
-        previews.was_drawn()
+        previews.looking.slices.end()
         _tell_fault(error, say)
 
 
@@ -210,13 +203,10 @@ def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, s
     elif settings.view == "COEFFICIENTS":
         _show_coefficients(quad, colors, renderer, request, "COEFFICIENTS", 0.75)
     else:
-        if settings.view == "HOLES":
-            holes = renderer.drawn_holes(replace(request, quick=True, levels=True))
-            _show_scribbles(quad, _HOLES, holes, renderer)
         if settings.view == "EDGES":
             _show_coefficients(quad, colors, renderer, request, "EDGES", 1.0)
         _show_strokes(context, quad, shown, wanted.decision.snapshot)
-    previews.was_drawn()
+    previews.looking.slices.end()
     _tell_carrying(say)
     for sentence in pictures.shortages(renderer, wanted.decision.snapshot, request):
         say(sentence)

@@ -73,7 +73,7 @@ def _effect(session: RenderSession, shown: tuple) -> EffectCheck:
     try:
         _check_footage(scene, effect, strip)
         taken = snapshot.take(scene, effect, strip, frames)
-        requests = [session.request(taken, frame, context) for frame in sorted(taken.frames)]
+        requests = [context.request(taken, frame) for frame in sorted(taken.frames)]
         renderer = session.renderer(requests[0].source)
         _check_frames(renderer, requests)
         _check_mattes(check, renderer.source, requests)

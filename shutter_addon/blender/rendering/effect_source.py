@@ -98,12 +98,6 @@ class SourceKey:
         """The place of its renderer: an effect has one for plain and one for smooth pictures."""
         return self.scene, self.steps > 1
 
-    def is_beside(self, other: SourceKey) -> bool:
-        """Tell whether one is plain and the other smooth, of the same footage in the same detail."""
-        is_smooth = self.detail.smooth, other.detail.smooth
-        same = self.spec == other.spec and replace(self.detail, smooth=is_smooth[1]) == other.detail
-        return same and is_smooth[0] != is_smooth[1]
-
     def open(self, *, planes: bool = False, keeps: bool = False) -> ShotSource:
         """Open the source.
 

@@ -1,11 +1,12 @@
 """The render engine of effect scenes, which Blender's sequencer calls for every frame of an effect strip."""
 
 import inspect
+from dataclasses import replace
 
 import bpy
 import mathutils
 import numpy as np
-from bpy.types import Depsgraph, RenderEngine
+from bpy.types import Depsgraph
 
 from ...core import stopping
 from ...core.messages import signed
@@ -29,7 +30,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
         except BaseException as error:  # otherwise Blender prints it, and renders the frame without the effect
             invalidation.spoil(depsgraph.scene.session_uid)
             if not isinstance(error, StoppedError):
-                fail(self, effect_source.in_words(error))
+                self.fail(effect_source.in_words(error))
             elif not self.test_break():
                 render_job.cancel(self.test_break)
 
@@ -56,9 +57,9 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
             with stopping.once(stopped or self._stopped):
                 picture = pictures.picture(context, shown, frame, detail)
         except StoppedError:
-            if stopped is None:
+            if asked is None or stopped is None:
                 raise
-            previews.engine_stopped()
+            previews.looking.decision = replace(asked, is_late=True)
             invalidation.keep_until_drawn(scene.session_uid)
             return
         picture = pictures.resized(picture, width, height, detail.divisor)
@@ -82,6 +83,14 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
             if render_pass.name == "Combined":  # one for each view of a stereo edit
                 render_pass.rect.foreach_set(values)
 
+    def fail(self, sentence: str) -> None:
+        """Report why there is no picture, and end a render, which would write the frame without the effect."""
+        if render_job.ends_films():
+            render_job.fail(sentence)
+            render_job.cancel(self.test_break)
+        else:
+            self.report({"ERROR"}, signed(sentence))
+
     def _stopped(self) -> bool:
         return self.test_break() or render_job.stopping()
 
@@ -90,15 +99,6 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
             render_job.say(message)
         else:
             self.report({"WARNING"}, signed(message))
-
-
-def fail(engine: RenderEngine, sentence: str) -> None:
-    """Report why there is no picture, and end a render, which otherwise would write the frame without the effect."""
-    if render_job.ends_films():
-        render_job.fail(sentence)
-        render_job.cancel(engine.test_break)
-    else:
-        engine.report({"ERROR"}, signed(sentence))
 
 
 classes = (VirtualShutterEngine,)

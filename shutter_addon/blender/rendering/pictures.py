@@ -14,6 +14,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ...compute.renderer import Renderer
 from ...compute.request import Request
 from ...core import stopping
+from ...core.pixels.matte_grid import block_means
 from ...devices.device import MEGABYTE
 from ...media import color
 from ...media.image_writing import write_exr
@@ -40,15 +41,22 @@ def picture(context: RenderContext, snapshot: Snapshot, frame: float, detail: De
     stopping.check()
     session, request = context.session, context.request(snapshot, frame, detail)
     renderer = context.renderer(request)  # opened again, if the window has closed it meanwhile
-    if (weights := render_settings.weights()) is not None:
+    if (weights := render_settings.settings.weights) is not None:
         place = weights / f"{round(frame - snapshot.first + 1):04d}.exr"
-        _write_weights(place, snapshot, frame, session.weights(request))
+        _write_weights(place, snapshot, frame, session.run(_weights, renderer, request))
     if renderer.source.by_blender:
         _say_once(rpt_(SLOW_DECODING), context.say)
     made = session.picture(request)
     for sentence in shortages(renderer, snapshot, request):
         _say_once(sentence, context.say)
     return made
+
+
+def _weights(renderer: Renderer, request: Request) -> list[np.ndarray]:
+    """Return the coefficients (h, w) of all shutters, then the mattes of all layers in blocks of the same size."""
+    block = request.state.options.aggregate
+    mattes = [block_means(matte, block) for matte in renderer.layer_mattes(request)]
+    return [*renderer.coefficients(request), *mattes]
 
 
 def _write_weights(place: Path, snapshot: Snapshot, frame: float, weights: list[np.ndarray]) -> None:

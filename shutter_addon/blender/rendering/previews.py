@@ -34,7 +34,7 @@ _SLICE = 0.15  # seconds
 _PLAYED = 1.0  # seconds of the only slice of a frame during playback
 _READING_TOOL = "builtin.sample"  # it reads once before its operator runs
 DRAFT_ROWS = 270  # blocks along the shorter side of a draft in which shutters follow edges
-RESULTS = "RESULT", "SPLIT", "EDGES", "HOLES"  # views of the live preview that show the result
+RESULTS = "RESULT", "SPLIT", "EDGES"  # views of the live preview that show the result
 
 
 @dataclass
@@ -132,12 +132,6 @@ def for_engine(context: Context, effect_scene: Scene) -> Decision | None:
     return Decision(snapshot, frame, _best(context, sessions.of_drawing(), snapshot, frame, detail))
 
 
-def engine_stopped() -> None:
-    """Note that the engine's picture was not finished in time."""
-    assert looking.decision is not None
-    looking.decision = replace(looking.decision, is_late=True)
-
-
 def take_decision() -> Decision | None:
     """Return the engine's decision for this redraw; None: Blender had the picture already."""
     decision, looking.decision = looking.decision, None
@@ -157,7 +151,9 @@ def for_drawing(context: Context, shown: Shown, decision: Decision | None) -> Dr
     request = _drafted(context, shown, decision.request)
     has_result = settings.view in RESULTS
     left = settings.split if settings.view == "SPLIT" else 0.0 if has_result else 1.0
-    if is_tracking():  # in the sharp source, the user sees whether a stroke stays on its subject
+    if (
+        _TRACKING & render_job.operators_running()
+    ):  # in the sharp source, the user sees whether a stroke stays on its subject
         left = 1.0
     # Otherwise Blender shows the engine's picture among the other strips.
     draws_result = has_result and left < 1 and (decision.is_drawn or not _is_rendered(shown))
@@ -261,8 +257,7 @@ def _drafted(context: Context, shown: Shown, request: Request) -> Request:
 
 
 def draft(request: Request, source: FrameSource) -> Request:
-    """Return the request as a draft: where shutters follow edges, in blocks, DRAFT_ROWS at most along the shorter side.
-    Return the request as a draft: where shutters follow edges, in blocks, DRAFT_ROWS at most along the shorter side."""
+    """Return the request as a draft: where shutters follow edges, in blocks, DRAFT_ROWS at most along a side."""
     options = request.state.options
     if not options.edge_aware:
         return request
@@ -288,16 +283,6 @@ def _time_up(context: Context, key: tuple) -> Slice:
     return looking.slices.next(key, _SLICE / 2, _SLICE)  # the playhead and a note move after the first slice
 
 
-def was_drawn() -> None:
-    """Note that a picture is finished."""
-    looking.slices.end()
-
-
-def is_composing() -> bool:
-    """Tell whether a first or a better picture is being made."""
-    return looking.slices.last is not None or smooth_previews.is_busy()
-
-
 def refine() -> None:
     """Go on with the smooth pictures behind those drawn. One of effect_source.FAULTS: there is none."""
     if pen_is_down():
@@ -318,11 +303,6 @@ def _is_playing(context: Context) -> bool:
 def pen_is_down() -> bool:
     """Tell whether a stroke is being drawn or erased."""
     return _PEN in render_job.operators_running()
-
-
-def is_tracking() -> bool:
-    """Tell whether a tracking operator runs."""
-    return bool(_TRACKING & render_job.operators_running())
 
 
 def may_be_late() -> bool:

@@ -6,7 +6,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...devices.device import MEGABYTE, Budget
+from ...devices.device import MEGABYTE, Budget, allowed
 from ..data import preferences
 from ..data.property_copy import for_a_while
 from ..devices import available
@@ -29,7 +29,7 @@ class _RenderSettings:
     budget: tuple[int, Budget] | None = None
 
 
-_settings = _RenderSettings()  # of the running command; empty in the window
+settings = _RenderSettings()  # of the running command; empty in the window
 
 
 def using(
@@ -37,39 +37,34 @@ def using(
 ) -> AbstractContextManager[None]:
     """Give renders these settings inside a `with` block, in a command."""
     changes = {"device": device, "weights": weights, "gpu_memory": gpu_memory}
-    return for_a_while((_settings, name, value) for name, value in changes.items())
-
-
-def weights() -> Path | None:
-    """Return the folder for the coefficients of every picture, or None."""
-    return _settings.weights
+    return for_a_while((settings, name, value) for name, value in changes.items())
 
 
 def wanted() -> str:
     """Return the device that the command or the user wants, one of available.CHOICES."""
-    return _settings.device or preferences.device()
+    return settings.device or preferences.device()
 
 
 def _wanted_memory() -> int:
     """Return the megabytes that the command or the user sets; 0: as many as allowed."""
-    return preferences.gpu_memory() if _settings.gpu_memory is None else _settings.gpu_memory
+    return preferences.gpu_memory() if settings.gpu_memory is None else settings.gpu_memory
 
 
 def memory() -> Budget:
     """Return the budget of GPU memory that all sessions share.
 
-    OpenGL knows the size best, where it may be asked; otherwise the first device tells.
+    OpenGL knows the size best, where it may be asked.
     """
-    if _settings.budget is None:
+    if settings.budget is None:
         megabytes = _wanted_memory()
-        asks = not megabytes and wanted() in ("auto", "gpu", "opengl")
-        _settings.budget = megabytes, Budget(megabytes * MEGABYTE or (available.opengl().memory if asks else None))
-    return _settings.budget[1]
+        known = available.opengl().memory if not megabytes and wanted() in ("auto", "gpu", "opengl") else None
+        settings.budget = megabytes, Budget(megabytes * MEGABYTE or known or allowed(None))
+    return settings.budget[1]
 
 
 def forget_memory_if_changed() -> bool:
     """Forget the budget if another limit is wanted now. Return whether it was."""
-    if _settings.budget is None or _settings.budget[0] == _wanted_memory():
+    if settings.budget is None or settings.budget[0] == _wanted_memory():
         return False
-    _settings.budget = None
+    settings.budget = None
     return True

@@ -17,7 +17,6 @@ from ...compute.request import Request
 from ...core import stopping, threads
 from ...core.messages import translated
 from ...core.model.state_at import state_at
-from ...core.pixels.matte_grid import block_means
 from ...core.pixels.shown_levels import Display
 from ...core.stopping import StoppedError
 from ...devices.device import NoDeviceError
@@ -41,12 +40,10 @@ class Work(NamedTuple):
     Attributes:
         future: Its result.
         ended: Set, it ends before its next step.
-        relayed: Whether the main thread has its GPU.
     """
 
     future: Future
     ended: threading.Event
-    relayed: bool
 
     def break_off(self) -> None:
         self.ended.set()
@@ -55,22 +52,22 @@ class Work(NamedTuple):
     def result(self) -> Any:
         """Return the result as result_of; break the work off where it is no longer wanted."""
         try:
-            return result_of(self.future, self.relayed)
+            return result_of(self.future)
         except StoppedError:
             self.break_off()
             raise
 
 
-def result_of(future: Future[T], relayed: bool) -> T:
+def result_of(future: Future[T]) -> T:
     """Wait for a future's result.
 
     Raises:
         StoppedError: It is no longer wanted (stopping.once).
-        NoDeviceError: Blender's GPU is not current, so waiting would never end.
+        NoDeviceError: It waits for Blender's GPU, which is not current, so waiting would never end.
     """
     is_window = where() is Where.WINDOW
     while not wait([future], 0 if is_window else _PATIENCE).done:
-        if is_window and not main_thread.serve() and relayed:
+        if is_window and not main_thread.serve():
             require_context()
         stopping.check()
     return future.result()
@@ -99,8 +96,34 @@ class RenderContext:
     display: Display | None = None
 
     def request(self, snapshot: Snapshot, frame: float, detail: Detail | None = None) -> Request:
-        """Return a request as RenderSession.request."""
-        return self.session.request(snapshot, frame, self, detail)
+        """Return the request for what an effect strip shows at a timeline frame.
+
+        Args:
+            detail: None: as it was the last time, where no picture is made.
+
+        Raises:
+            One of FAULTS: It cannot be shown.
+            StoppedError: It is no longer wanted.
+        """
+        session = self.session
+        key = SourceKey.of(snapshot, detail or session.last_detail(snapshot.scene))
+        source = session.renderer(key, self.say).source
+        if (last := session.requests.get(key.place)) and last[0] is snapshot and last[1] == frame:
+            request = last[2]
+            if (request.source, request.levels, request.display) == (key, self.levels, self.display):
+                return request
+        with translated(rpt_):
+            index, state, direction = state_at(snapshot.effect, clip_of(snapshot, source), frame)
+        request = Request(
+            index=index,
+            state=state.in_blocks(max(state.options.aggregate // key.detail.divisor, 1)),
+            direction=direction,
+            source=key,
+            levels=self.levels,
+            display=self.display,
+        )
+        session.requests[key.place] = snapshot, frame, request
+        return request
 
     def renderer(self, request: Request) -> Renderer:
         """Return a renderer as RenderSession.renderer."""
@@ -126,7 +149,7 @@ class RenderSession:
         self._executor: Executor | None = None
         self._compositor: Future | None = None
         self._renderers: dict[Place, tuple[SourceKey, Renderer]] = {}
-        self._requests: dict[Place, tuple[Snapshot, float, Request]] = {}  # the last ones
+        self.requests: dict[Place, tuple[Snapshot, float, Request]] = {}  # the last ones, with their snapshots
         self._shown: dict[int, float] = {}  # last timeline frame by scene
         self._begun: dict[int, tuple[tuple, Work]] = {}  # key and work of the begun picture by scene
 
@@ -155,44 +178,10 @@ class RenderSession:
                 self._executor = threads.pool(1)
             with suppress(RuntimeError):  # at Python's exit, threads take no more work
                 future = self._executor.submit(broken_off, ended.is_set, function, *arguments)
-                return Work(future, ended, self.device == "relayed")
+                return Work(future, ended)
         done: Future = Future()
         done.set_result(function(*arguments))
-        return Work(done, ended, False)
-
-    def request(
-        self, snapshot: Snapshot, frame: float, context: RenderContext, detail: Detail | None = None
-    ) -> Request:
-        """Return the request for what an effect strip shows at a timeline frame.
-
-        Args:
-            detail: None: as it was the last time, where no picture is made.
-
-        Raises:
-            One of FAULTS: It cannot be shown.
-            StoppedError: It is no longer wanted.
-        """
-        if detail is None:
-            known = map(self._renderers.get, ((snapshot.scene, False), (snapshot.scene, True)))
-            detail = next((each[0].detail for each in known if each), FULL)
-        key = SourceKey.of(snapshot, detail)
-        source = self.renderer(key, context.say).source
-        if (last := self._requests.get(key.place)) and last[0] is snapshot and last[1] == frame:
-            request = last[2]
-            if (request.source, request.levels, request.display) == (key, context.levels, context.display):
-                return request
-        with translated(rpt_):
-            index, state, direction = state_at(snapshot.effect, clip_of(snapshot, source), frame)
-        request = Request(
-            index=index,
-            state=state.in_blocks(max(state.options.aggregate // key.detail.divisor, 1)),
-            direction=direction,
-            source=key,
-            levels=context.levels,
-            display=context.display,
-        )
-        self._requests[key.place] = snapshot, frame, request
-        return request
+        return Work(done, ended)
 
     def picture(self, request: Request) -> np.ndarray:
         """Return the picture, which may have been begun already. StoppedError: it is no longer wanted."""
@@ -216,12 +205,13 @@ class RenderSession:
         step, last = snapshot.film
         if frame - before == step and frame + step <= last and frame + step in snapshot.frames:
             with suppress(*FAULTS):  # raised again when the picture is asked for
-                request = self.request(snapshot, frame + step, context, FULL)
+                request = context.request(snapshot, frame + step, FULL)
                 self._begun[snapshot.scene] = request.key, self._begin(request)
 
-    def weights(self, request: Request) -> list[np.ndarray]:
-        """Return the coefficients (h, w) of all shutters, then the mattes of all layers in blocks of the same size."""
-        return self._submit(_weights, self.renderer(request.source), request).result()
+    def last_detail(self, scene: int) -> Detail:
+        """Return the detail of an effect scene's last pictures."""
+        known = map(self._renderers.get, ((scene, False), (scene, True)))
+        return next((each[0].detail for each in known if each), FULL)
 
     def renderer(self, key: SourceKey, say: Callable[[str], None] = print) -> Renderer:
         """Return the renderer of a key. An effect keeps at most two, for plain and smooth pictures.
@@ -236,9 +226,6 @@ class RenderSession:
                 self._submit(known[1].close)
             source = key.open(planes=compositor.takes_planes, keeps=self._late is None)
             known = key, Renderer(compositor, source, MatteValues.of(source, self._late))
-            other = key.scene, not key.place[1]
-            if other in self._renderers and not self._renderers[other][0].is_beside(key):
-                self._submit(self._renderers.pop(other)[1].close)
         self._renderers[key.place] = known
         while len({scene for scene, _ in list(self._renderers)}) > _KEPT:
             self._submit(self._renderers.pop(next(iter(self._renderers)))[1].close)
@@ -257,7 +244,7 @@ class RenderSession:
             if self._chosen and (message := self._chosen[1]):
                 say(message)
         try:
-            return result_of(self._compositor, self.device == "relayed")
+            return result_of(self._compositor)
         except NoDeviceError:
             self._compositor = None
             raise
@@ -277,10 +264,6 @@ class RenderSession:
         for _key, renderer in list(self._renderers.values()):
             self.run(renderer.release)
 
-    def forget_requests(self) -> None:
-        """Forget the last requests and their snapshots."""
-        self._requests.clear()
-
     def rest(self) -> None:
         """Break off begun pictures, and stop decoding in advance."""
         self._drop_begun(list(self._begun))
@@ -296,8 +279,8 @@ class RenderSession:
     def keep(self, scenes: set[int]) -> None:
         """Close the renderers of scenes other than these session_uids. A render job may remove some meanwhile."""
         self._drop_begun(set(self._begun) - scenes)
-        for place in [place for place in (*self._requests, *self._renderers) if place[0] not in scenes]:
-            self._requests.pop(place, None)
+        for place in [place for place in (*self.requests, *self._renderers) if place[0] not in scenes]:
+            self.requests.pop(place, None)
             _key, renderer = self._renderers.pop(place, (None, None))
             if renderer is not None:
                 self._submit(renderer.close)
@@ -324,9 +307,3 @@ class RenderSession:
         except NoDeviceError:
             pass  # raised again when a picture is asked for
         self.forget()
-
-
-def _weights(renderer: Renderer, request: Request) -> list[np.ndarray]:
-    block = request.state.options.aggregate
-    mattes = [block_means(matte, block) for matte in renderer.layer_mattes(request)]
-    return [*renderer.coefficients(request), *mattes]

@@ -54,15 +54,11 @@ def of_render(
     say: Callable[[str], None] = print, *, levels: bool = False, display: Display | None = None
 ) -> RenderContext:
     """Return the context of a render, on a device that needs no window. NoDeviceError: there is none."""
-    return RenderContext(_of_render(), say, levels=levels, display=display)
-
-
-def _of_render() -> RenderSession:
-    """Return the session of the render on this thread."""
-    if render_job.where() is not Where.WAITED_FOR:
-        return OFFSCREEN
-    WAITED_FOR.settle()  # no handler runs when such a film begins
-    return WAITED_FOR if OFFSCREEN.device == "relayed" else OFFSCREEN
+    session = OFFSCREEN
+    if render_job.where() is Where.WAITED_FOR:
+        WAITED_FOR.settle()  # no handler runs when such a film begins
+        session = WAITED_FOR if OFFSCREEN.device == "relayed" else OFFSCREEN
+    return RenderContext(session, say, levels=levels, display=display)
 
 
 def settle() -> None:
@@ -77,7 +73,7 @@ def end_job() -> None:
     """Drop what a window's job has begun, and snapshots. A script's next still may go on from the last one."""
     if render_job.where() is Where.JOB:
         OFFSCREEN.rest()
-    OFFSCREEN.forget_requests()
+    OFFSCREEN.requests.clear()
 
 
 def drop_removed() -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from concurrent.futures import Future, wait
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from bpy.types import PropertyGroup
@@ -27,16 +27,22 @@ from ..data.source_media import SourceSpec
 _KEPT = 64  # pairs of frames whose motion is kept, half a megabyte each
 _TRIED = 4  # pairs around the shown frame, until the motion of one can be found
 
-_moved: Kept[tuple, steps.Moved | None] = Kept()  # by a source's key and the first frame of a pair
-# By scene: the timeline frame of the last look, the step that it found, and whether the source repeats frames.
-_last_looks: dict[int, tuple[float | None, float | None, bool]] = {}
 _NEVER = None, None, False
 
 
 @dataclass
 class _Measuring:
-    """What is to be measured next, a source and the first frame of a pair, and what is measured now."""
+    """What is measured.
 
+    Attributes:
+        moved: By a source's key and the first frame of a pair.
+        looks: By scene: the timeline frame of the last look, the step it found, and whether the source repeats frames.
+        wanted: What is to be measured next, a source and the first frame of a pair.
+        job: What is measured now.
+    """
+
+    moved: Kept[tuple, steps.Moved | None] = field(default_factory=Kept)
+    looks: dict[int, tuple[float | None, float | None, bool]] = field(default_factory=dict)
     wanted: tuple[SourceSpec, int] | None = None
     job: Future | None = None
 
@@ -51,19 +57,19 @@ def look(effect: PropertyGroup, snapshot: Snapshot, renderer: Renderer, request:
     """
     _measuring.wanted, before = None, (last(effect), repeats(effect))
     frame, known = effect.id_data.frame_current, _step(effect, snapshot, renderer, request)
-    _last_looks[snapshot.scene] = frame, known, renderer.source.repeats
+    _measuring.looks[snapshot.scene] = frame, known, renderer.source.repeats
     return known, (known, renderer.source.repeats) != before
 
 
 def last(effect: PropertyGroup) -> float | None:
     """Return the step that the last look found, if it was at the current frame."""
-    frame, known, _repeats = _last_looks.get(effect.scene.session_uid, _NEVER)
+    frame, known, _repeats = _measuring.looks.get(effect.scene.session_uid, _NEVER)
     return known if frame == effect.id_data.frame_current else None
 
 
 def repeats(effect: PropertyGroup) -> bool:
     """Tell whether the last look found that the source repeats frames."""
-    return _last_looks.get(effect.scene.session_uid, _NEVER)[-1]
+    return _measuring.looks.get(effect.scene.session_uid, _NEVER)[-1]
 
 
 def _step(effect: PropertyGroup, snapshot: Snapshot, renderer: Renderer, request: Request) -> float | None:
@@ -73,10 +79,10 @@ def _step(effect: PropertyGroup, snapshot: Snapshot, renderer: Renderer, request
     exposed = _exposed_pairs(renderer, request)
     for pair in sorted(set().union(*exposed.values()), key=lambda first: abs(first - request.index))[:_TRIED]:
         key = snapshot.source.key, pair
-        if key not in _moved:
+        if key not in _measuring.moved:
             _measuring.wanted = snapshot.source, pair
             return None
-        if (moved := _moved[key]) is not None:
+        if (moved := _measuring.moved[key]) is not None:
             height, state = effect.scene.render.resolution_y, request.state
             shutters = [shutter for shutter, pairs in exposed.items() if pair in pairs]
             step = height * max(steps.step(moved, *_ways(state, i, pair, renderer.source.height)) for i in shutters)
@@ -135,12 +141,12 @@ def forget() -> None:
     if _measuring.job is not None:
         wait([_measuring.job])
     _measuring.job = _measuring.wanted = None
-    _moved.clear()
-    _last_looks.clear()
+    _measuring.moved.clear()
+    _measuring.looks.clear()
 
 
 def _measure_motion(spec: SourceSpec, pair: int) -> None:
-    _moved.keep((spec.key, pair), None, _KEPT)  # an unreadable pair is not tried again
+    _measuring.moved.keep((spec.key, pair), None, _KEPT)  # an unreadable pair is not tried again
     if opencv.cv2 is not None:
         with suppress(MediaError, OSError), spec.open() as medium:
-            _moved.keep((spec.key, pair), steps.moved(medium, pair), _KEPT)
+            _measuring.moved.keep((spec.key, pair), steps.moved(medium, pair), _KEPT)

@@ -1138,13 +1138,6 @@ MESSAGES = {
         "Make the active region leave a trail in front of everything else, which stays sharp",
     ): "Die aktive Region eine Spur ziehen lassen, vor allem anderen, das scharf bleibt",
     ("*", "Subject"): "Motiv",
-    ("Virtual Shutter", "Holes"): "Löcher",
-    (
-        "*",
-        "The result and the holes behind layers: orange is taken from another frame, "
-        "purple is filled from its surroundings",
-    ): "Das Ergebnis, und wo kein belichteter Frame zeigt, was hinter Ebenen liegt: Orange stammt aus einem anderen "
-    "Frame, Violett ist aus der Umgebung gefüllt",
     ("*", "Nothing"): "Nichts",
     ("*", "Camera"): "Kamera",
     ("*", "What the exposure moves with"): "Womit sich die Belichtung mitbewegt",
