@@ -23,7 +23,6 @@ _MODULES = (
     "interface.full_quality",
     "interface.panels",
     "interface.menus",
-    "interface.note_buttons",
     "interface.gizmo_groups",
     "interface.bar_editor",
     "interface.region_gizmo",

@@ -1,5 +1,5 @@
-"""Footage with too few frames for its exposure: the note in the preview, its button, which makes the streak smooth and
-has the note go, and undo. Run inside Blender, by test_window.py."""
+"""Footage with too few frames for its exposure: the note, its button, which makes the streak smooth and has the note
+go, and undo. Run inside Blender, by test_window.py."""
 
 # ruff: noqa: E402 (Blender finds the helpers once it knows their folder)
 import os
@@ -11,14 +11,12 @@ sys.path.append(os.environ["SHUTTER_PACKAGES"])
 
 import bpy
 import driver
-import full_quality_story as look
 import numpy as np
 import story
 from support import write_frames
 
 COUNT, SIZE, SPEED = 10, (360, 640), 7
 FILM = driver.OUT / "film"
-BUTTON = "shutter.smooth_streaks"
 
 
 def frame(number):
@@ -44,10 +42,6 @@ def opened():
     yield 1.0
 
 
-def label():
-    return look.label(BUTTON)
-
-
 def note():
     """How far it goes from one frame of the exposure to the next, in pixels."""
     strobing = sys.modules["bl_ext.user_default.virtual_shutter.shutter_addon.blender.rendering.strobing"]
@@ -59,7 +53,7 @@ def shown(name):
     driver.move(region, region.width / 2, region.height + 12)
     yield 1.0
     yield from driver.shot_when_shown(name)
-    driver.saw(step=name, crop=story.crop(), label=label(), smooth=story.effect().inbetween, bars=bar_counts())
+    driver.saw(step=name, crop=story.crop(), note=note(), smooth=story.effect().inbetween, bars=bar_counts())
 
 
 def bar_counts():
@@ -67,10 +61,8 @@ def bar_counts():
 
 
 def clicked():
-    region = story.preview()
-    driver.move(region, *look.button(BUTTON))
-    yield 0.5
-    driver.xdotool("click", 1)
+    with driver.override("PREVIEW"):
+        bpy.ops.shutter.smooth_streaks("EXEC_DEFAULT", True)
     yield 0.5
 
 
@@ -80,13 +72,13 @@ def told():
     yield from shown("1_steps")
     yield from clicked()
     yield from driver.until(lambda: story.effect().inbetween != "1", "the exposure is smooth")
-    yield from driver.until(lambda: label() is None, "the note goes", 20)
+    yield from driver.until(lambda: note() is None, "the note goes", 20)
     yield from shown("2_smooth")
     driver.move(story.preview(), 300, 300)
     yield 0.3
     driver.key("ctrl+z")
     yield from driver.until(lambda: story.effect().inbetween == "1", "it is undone")
-    yield from driver.until(label, "the note is back", 20)
+    yield from driver.until(note, "the note is back", 20)
     yield from shown("3_undone")
     driver.key("ctrl+shift+z")
     yield from driver.until(lambda: story.effect().inbetween != "1", "it is redone")

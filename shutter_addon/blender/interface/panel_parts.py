@@ -8,6 +8,7 @@ import numpy as np
 from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
+from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import Context, Menu, PropertyGroup, Scene, Strip, UILayout
 from bpy.utils.previews import ImagePreviewCollection
 
@@ -49,6 +50,15 @@ def sentence(layout: UILayout, words: str, icon: str = "NONE", room: float = 1.0
         row = column.row()
         row.scale_y = 0.8 if i else 1.0
         row.label(text=line, icon=icon if i == 0 or icon == "NONE" else "BLANK1", translate=False)
+
+
+def too_few_frames(step: float) -> str:
+    """Return a note about an exposure that shows copies.
+
+    Args:
+        step: pixels from one exposed frame to the next.
+    """
+    return rpt_("Too few frames: steps of {pixels} pixels").format(pixels=f"{step:.0f}")
 
 
 def draw_fields(layout: UILayout, owner: PropertyGroup, kind: type) -> None:

@@ -13,8 +13,7 @@ from ...core.model.effect import Shutter
 from ..data import annotations, consistency, data_format, selection, strips
 from ..editing import bar_edits, match_source
 from ..rendering import strobing
-from . import bake_operators, note_buttons, region_panels
-from .note_buttons import Button
+from . import bake_operators, region_panels
 from .operator_bases import Mixin
 from .panel_parts import (
     WIDEST,
@@ -27,6 +26,7 @@ from .panel_parts import (
     of_effect,
     pattern_icon,
     sentence,
+    too_few_frames,
 )
 
 
@@ -202,6 +202,7 @@ def _draw_live(layout: UILayout, context: Context) -> None:
     view.active = live.live
     view.prop(live, "view", text="")
     view.prop(live, "probe", text="", icon="EYEDROPPER")
+    row.operator("shutter.full_quality", text="", icon="VIEW_ZOOM")
     notes = row.row(align=True)
     effect = selection.active(context)[1]
     found = {region_panels.tracking_icon(effect, index) for index in _tracked(effect)} | {
@@ -219,24 +220,24 @@ def _draw_source(layout: UILayout, effect: PropertyGroup) -> None:
     layout.operator_menu_enum("shutter.source", "strip", text=words, icon="SEQUENCE", translate=False)
 
 
-def _notes(context: Context) -> Iterator[tuple[str, Button | None]]:
-    """Yield notes on the active effect, each with the button that helps. An empty label means the operator's own."""
+def _notes(context: Context) -> Iterator[tuple[str, str]]:
+    """Yield notes on the active effect, each with the operator that helps, or ""."""
     scene, effect, strip = selection.active(context)
     if (newer := data_format.note([scene, *bpy.data.scenes])) is not None:
-        yield newer, None
+        yield newer, ""
     if selection.in_picture(context) is None:
-        yield selection.why_unseen(scene, strip), None
+        yield selection.why_unseen(scene, strip), ""
     if (shown := match_source.shown(effect)) is not None:
         if shown.differences:
             what = ", ".join(iface_(word) for word in shown.differences)
-            yield iface_("Differs from its source: {what}").format(what=what), ("shutter.match_source", "")
+            yield iface_("Differs from its source: {what}").format(what=what), "shutter.match_source"
         if shown.lacks_modifiers:
-            yield iface_("The effect does not use the modifiers of the source"), None
+            yield iface_("The effect does not use the modifiers of the source"), ""
         if shown.has_effects:
             words = iface_("The effect does not use effect strips of the source: make the Shutter strip their input")
-            yield words, None
+            yield words, ""
     if (step := strobing.last(effect)) is not None:
-        yield note_buttons.of_strobing(step)
+        yield too_few_frames(step), "shutter.smooth_streaks"
 
 
 def _tracked(effect: PropertyGroup) -> list[int | None]:
@@ -260,12 +261,11 @@ class SHUTTER_PT_notes(Panel):
 
     def draw(self, context: Context) -> None:
         layout, effect = self.layout, selection.active(context)[1]
-        for words, button in _notes(context):
+        for words, operator in _notes(context):
             column = layout.column(align=True)
             sentence(column, words, "INFO")
-            if button is not None:
-                operator, label = button
-                column.operator(operator, **({"text": label, "translate": False} if label else {}))
+            if operator:
+                column.operator(operator)
         for index in _tracked(effect):
             region_panels.draw_tracked(layout, effect, index)
 

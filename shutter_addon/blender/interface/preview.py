@@ -1,13 +1,12 @@
 """The live preview: pictures, views, strokes and notes that a handler draws over the sequencer's picture."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
 import bpy
 import gpu
 import numpy as np
-from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, PointerProperty
 from bpy.types import Context, PropertyGroup, Region
@@ -35,9 +34,9 @@ from ..rendering import (
     strobing,
 )
 from ..rendering.previews import Decision, Drawing
-from . import drawing, note_buttons, sharp_frame
+from . import drawing, sharp_frame
 from .drawing import Quad
-from .note_buttons import Button
+from .panel_parts import too_few_frames
 
 VIEWS = (
     ("RESULT", "Result", "The finished picture"),
@@ -69,6 +68,7 @@ def _redraw_when_still() -> float | None:
 
 _HOLES = (1.0, 0.55, 0.0), (0.75, 0.2, 0.9)  # colors of compute.plates.TAKEN and FILLED
 Colors = Sequence[Sequence[float]]  # display values
+Say = Callable[[str], None]  # adds a note
 _NAVIGATION = 56  # interface units: Blender's navigation buttons at the right of a preview
 _TICK = 0.25  # seconds
 _STILL = 0.4  # seconds after which a frame counts as still
@@ -118,7 +118,6 @@ def _draw() -> None:
     """Draw over a preview. This is the draw handler."""
     context = bpy.context
     blender_gpu.free_unused()
-    note_buttons.clear(context.region)
     decision = previews.take_decision()
     if bpy.app.is_job_running("RENDER") or render_job.ends_films():
         return
@@ -138,7 +137,8 @@ def _draw() -> None:
         previews.was_drawn()
         previews.refine()
         return
-    say = _Notes(context.region)
+    notes: list[str] = []
+    say = notes.append
     if not context.window_manager.virtual_shutter.live:
         with suppress(*effect_source.FAULTS):  # no notes
             previews.refine()
@@ -154,10 +154,10 @@ def _draw() -> None:
             previews.refine()
         except effect_source.FAULTS as error:
             _tell_fault(error, say)
-        say.draw()
+        _draw_notes(context.region, notes)
 
 
-def _show(context: Context, shown: Shown, decision: Decision | None, say: "_Notes") -> None:
+def _show(context: Context, shown: Shown, decision: Decision | None, say: Say) -> None:
     """Draw the effect, or a note why that is impossible.
 
     Args:
@@ -184,7 +184,7 @@ def _show(context: Context, shown: Shown, decision: Decision | None, say: "_Note
         _tell_fault(error, say)
 
 
-def _tell_unseen(context: Context, say: "_Notes") -> None:
+def _tell_unseen(context: Context, say: Say) -> None:
     """Add a note why the active effect is not visible, if no other effect is."""
     active = selection.active(context)
     if active is None or selection.seen(active[0]) or not context.space_data.show_overlays:
@@ -192,11 +192,11 @@ def _tell_unseen(context: Context, say: "_Notes") -> None:
     say(selection.why_unseen(active[0], active[2]))
 
 
-def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, say: "_Notes") -> None:
+def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, say: Say) -> None:
     settings, renderer, request = context.window_manager.virtual_shutter, wanted.renderer, wanted.request
     is_still = not context.screen.is_animation_playing
     if context.space_data.show_overlays:
-        _tell_detail(wanted, annotations.picture_size(shown.effect), is_still, say)
+        _tell_detail(wanted, annotations.picture_size(shown.effect), say)
     if wanted.left > 0 or wanted.draws_result:
         _warn(shown, say)
     if wanted.left > 0:
@@ -226,7 +226,7 @@ def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, s
         _tell_strobing(*strobing.look(shown.effect, decision.snapshot, renderer, decision.request), say)
 
 
-def _warn(shown: Shown, say: "_Notes") -> None:
+def _warn(shown: Shown, say: Say) -> None:
     """Add notes about what a picture drawn over the sequencer's cannot show."""
     if shown.strips_above:
         say(rpt_("The strips above are hidden in this view"))
@@ -234,15 +234,15 @@ def _warn(shown: Shown, say: "_Notes") -> None:
         say(rpt_("This view uses the view transform Standard"))
 
 
-def _tell_detail(wanted: Drawing, size: tuple[int, int], is_still: bool, say: "_Notes") -> None:
-    """Add a note about how the preview is less than a render, with the button for full quality.
+def _tell_detail(wanted: Drawing, size: tuple[int, int], say: Say) -> None:
+    """Add a note about how the preview is less than a render.
 
     Args:
         size: of the rendered picture.
     """
     source = wanted.renderer.source
     if previews.looking.whole is not None:
-        say(rpt_("Full quality: as it will be rendered"), ("shutter.full_quality", iface_("Back")))
+        say(rpt_("Full quality: as it will be rendered"))
         return
     less = []
     if source.width < size[0]:
@@ -252,14 +252,13 @@ def _tell_detail(wanted: Drawing, size: tuple[int, int], is_still: bool, say: "_
     if wanted.request is not wanted.decision.request:
         less.append(rpt_("draft edges"))
     if less:
-        button = ("shutter.full_quality", iface_("Full Quality")) if is_still else None
-        say(rpt_("Preview: {what}").format(what=", ".join(less)), button)
+        say(rpt_("Preview: {what}").format(what=", ".join(less)))
 
 
-def _tell_strobing(known: float | None, is_new: bool, say: "_Notes") -> None:
+def _tell_strobing(known: float | None, is_new: bool, say: Say) -> None:
     """Add a note about too few frames, as strobing.look returns it."""
     if known is not None:
-        say(*note_buttons.of_strobing(known))
+        say(too_few_frames(known))
     if is_new:
         main_thread.later(preview_areas.redraw_panels)  # panels may have been drawn before
     if strobing.is_busy():
@@ -276,17 +275,15 @@ def _measure() -> float | None:
 
 def _show_sharp(context: Context, shown: Shown | None) -> None:
     """Draw notes and strokes over the source frame."""
-    say = _Notes(context.region)
-    say(rpt_("Sharp frame to draw on: the result appears after the stroke"))
     with drawing.pixel_space(context.region), suppress(*effect_source.FAULTS):
-        say.draw()
+        _draw_notes(context.region, [rpt_("Sharp frame to draw on: the result appears after the stroke")])
         if shown is not None and not previews.pen_is_down():
             quad = Quad(context.region, shown)
             snapshot = invalidation.current(shown.scene, shown.effect, shown.strip, shown.scene.frame_current)
             _show_strokes(context, quad, shown, snapshot)
 
 
-def _tell_carrying(say: "_Notes") -> None:
+def _tell_carrying(say: Say) -> None:
     """Track missing mattes of outlines, and add a note on the progress."""
     fault, progress = outline_carrying.begin(show_carried), outline_carrying.progress()
     if fault is not None:
@@ -303,7 +300,7 @@ def show_carried() -> None:
     preview_areas.redraw()
 
 
-def _tell_fault(error: Exception | str, say: "_Notes") -> None:
+def _tell_fault(error: Exception | str, say: Say) -> None:
     """Add a note why there is no picture."""
     say(rpt_("Shutter: {fault}").format(fault=error))
 
@@ -366,32 +363,13 @@ def _palette(palette: Colors) -> Texture:
     return Texture(None, (*size, 1), "rgba32f", gpu.types.GPUTexture(size, layers=1, format="RGBA32F", data=data))
 
 
-class _Notes:
-    """Sentences at the upper left of a region, some with a button."""
-
-    def __init__(self, region: Region) -> None:
-        self._region = region
-        self._lines: list[tuple[str, Button | None]] = []
-
-    def __call__(self, sentence: str, button: Button | None = None) -> None:
-        """Add a sentence below the others."""
-        self._lines.append((sentence, button))
-
-    def draw(self) -> None:
-        unit = drawing.ui_scale()
-        y = self._region.height - 18 * unit
-        left, right = 16 * unit, self._region.width - _NAVIGATION * unit
-        high = (note_buttons.HEIGHT + 5) * unit
-        for sentence, button in self._lines:
-            lines = drawing.wrapped(sentence, right - left, drawing.SIZE)
-            for i, line in enumerate(lines):
-                y -= high if button and i + 1 == len(lines) else 18 * unit
-                drawing.plated(left, y, line)
-            if button is not None:
-                x = left + drawing.text_width(lines[-1]) + 10 * unit
-                if x + note_buttons.width(button) > right:  # no room beside it
-                    x, y = left, y - high
-                note_buttons.place(self._region, x, y - 6 * unit, button)
+def _draw_notes(region: Region, notes: list[str]) -> None:
+    """Draw sentences at the upper left of a region."""
+    unit = drawing.ui_scale()
+    left, right = 16 * unit, region.width - _NAVIGATION * unit
+    lines = [line for note in notes for line in drawing.wrapped(note, right - left, drawing.SIZE)]
+    for i, line in enumerate(lines):
+        drawing.plated(left, region.height - (36 + 18 * i) * unit, line)
 
 
 classes = (ShutterPreview,)
