@@ -25,6 +25,7 @@ class SHUTTER_OT_matte_add(OfEffect, ImportHelper, Operator):
     """Make a movie, an image sequence or a picture the matte of the active shutter"""
 
     bl_label = "Matte from File"
+    icon = "FILE_MOVIE"
     needs = (needs.room_for_a_region,)
 
     channel_name: StringProperty(
@@ -55,7 +56,7 @@ def _strips(context: Context) -> list[tuple]:
 STRIP = EnumProperty(name="Strip", items=_strips, translation_context=contexts.no_translation)
 
 
-@operator("Matte from Strip", needs.room_for_a_region, strip=STRIP)
+@operator("Matte from Strip", needs.room_for_a_region, icon="SEQUENCE", strip=STRIP)
 def matte_strip(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Make a movie, image or clip strip of the edit the matte of the active shutter, even if it is muted"""
     region = region_edits.add_region(effect, selection.active_shutter(effect), "MATTE", self.strip, matte="STRIP")
@@ -78,14 +79,14 @@ def _why_no_mask(_effect: PropertyGroup) -> str | None:
 _MASK = EnumProperty(name="Mask", items=_masks, translation_context=contexts.no_translation)
 
 
-@operator("Matte from Mask", needs.room_for_a_region, _why_no_mask, mask=_MASK)
+@operator("Matte from Mask", needs.room_for_a_region, _why_no_mask, icon="MOD_MASK", mask=_MASK)
 def matte_mask(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Make a mask the matte of the active shutter"""
     mask = _mask_named(self.mask)
     region_edits.add_region(effect, selection.active_shutter(effect), "MATTE", mask.name, matte="MASK", mask=mask)
 
 
-@operator("Outline from Mask", needs.room_for_a_region, _why_no_mask, mask=_MASK)
+@operator("Outline from Mask", needs.room_for_a_region, _why_no_mask, icon="CURVE_BEZCIRCLE", mask=_MASK)
 def outline_from_mask(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Make an outline of the active shutter that moves as a mask does"""
     shutter = selection.active_shutter(effect)
@@ -101,6 +102,7 @@ class SHUTTER_OT_matte_export(OfEffect, ImportHelper, Operator):
     """Write the active matte or outline as pictures, one for each frame of its strip, for other programs"""
 
     bl_label = "Export Matte"
+    icon = "EXPORT"
     bl_options = {"REGISTER"}
     needs = needs.a_region, _why_not_laid
 
@@ -125,7 +127,7 @@ class SHUTTER_OT_matte_export(OfEffect, ImportHelper, Operator):
 _RAMP = EnumProperty(name="Ramp", description="Shape of the ramp", items=RAMPS)
 
 
-@operator("Ramp", needs.room_for_a_region, ramp=_RAMP)
+@operator("Ramp", needs.room_for_a_region, icon="IPO_EASE_IN_OUT", ramp=_RAMP)
 def ramp_add(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Make a ramp across the picture the matte of the active shutter"""
     region_edits.add_region(effect, selection.active_shutter(effect), "RAMP", ramp=self.ramp)
@@ -135,7 +137,7 @@ def _why_no_time_map(effect: PropertyGroup) -> str | None:
     return region_edits.why_full(effect, regions=1, shutters=2)
 
 
-@operator("Time Map", needs.a_shutter, _why_no_time_map, ramp=_RAMP)
+@operator("Time Map", needs.a_shutter, _why_no_time_map, icon="TIME", ramp=_RAMP)
 def time_map(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Show every pixel at its own moment: a ramp from the first frame to the last (slit-scan)"""
     shutter_edits.add_time_map(effect, self.ramp)
@@ -153,6 +155,8 @@ class SHUTTER_OT_rolling_shutter(OfEffect, Operator):
     """Show every row as it was when the middle one was filmed, so that skewed lines become straight"""
 
     bl_label = "Rolling Shutter Repair"
+    icon = "CAMERA_DATA"
+    choices = "side"
     needs = (_why_no_repair,)
 
     side: EnumProperty(
@@ -186,7 +190,7 @@ _READS = EnumProperty(
 )
 
 
-@operator("Find Readout", _why_no_repair, reads=_READS)
+@operator("Find Readout", _why_no_repair, icon="VIEWZOOM", reads=_READS)
 def find_readout(self: Operator, context: Context, effect: PropertyGroup) -> None:
     """Find the sensor's readout time from lines that lean while they move around the current frame, and repair it"""
     with ExitStack() as after:

@@ -1,9 +1,11 @@
 """Base classes and helpers of operators: why they are greyed out, their errors, and operators that run for a while."""
 
 from collections.abc import Callable, Iterable
+from typing import Any
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.props import EnumProperty
 from bpy.types import Context, Event, Operator, PropertyGroup
 
 from ...core import told
@@ -56,7 +58,14 @@ def kept(items: Callable[[Context], Iterable[tuple]]) -> Callable[[object, Conte
 
 
 class Named(Mixin):
-    """An operator whose bl_idname comes from its class name."""
+    """An operator whose bl_idname comes from its class name.
+
+    Attributes:
+        icon, choices: how menus show it (panel_parts.draw_operators).
+    """
+
+    icon = "NONE"
+    choices = ""
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
@@ -115,11 +124,16 @@ class OfEffect(Named):
 
 
 def operator(
-    label: str, *needs: Need, options: set[str] = UNDOABLE, only_seen: bool = False, **properties: object
+    label: str,
+    *needs: Need,
+    icon: str = "NONE",
+    options: set[str] = UNDOABLE,
+    only_seen: bool = False,
+    **properties: Any,
 ) -> Callable[[Change], type[Operator]]:
     """Make an operator from a function that changes an effect. Its name, label and docstring become the operator's.
 
-    Other arguments are those of OfEffect, and properties of the operator.
+    Other arguments are those of OfEffect, and properties of the operator, of which menus show the choices of the first.
     """
 
     def made(change: Change) -> type[Operator]:
@@ -128,6 +142,8 @@ def operator(
             "__module__": change.__module__,
             "__annotations__": properties,
             "bl_label": label,
+            "icon": icon,
+            "choices": next((name for name, made in properties.items() if made.function is EnumProperty), ""),
             "bl_options": options,
             "only_seen": only_seen,
             "needs": needs,

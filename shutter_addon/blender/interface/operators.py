@@ -67,6 +67,7 @@ class SHUTTER_OT_add_effect(Named, Operator):
     """Add a Shutter strip, which gives every pixel its own exposure, above the active strip"""
 
     bl_label = "Add Shutter Strip"
+    icon = "ADD"
     bl_options = UNDOABLE
     refusal = staticmethod(why_no_effect)
 
@@ -131,13 +132,13 @@ def _choose_tab(waits: Iterator[float]) -> float | None:
     return None
 
 
-@operator("Add Shutter", needs.room_for_a_shutter)
+@operator("Add Shutter", needs.room_for_a_shutter, icon="ADD")
 def shutter_add(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Add a shutter that is fully open"""
     shutter_edits.add_shutter(effect)
 
 
-@operator("Duplicate Shutter", needs.a_shutter, needs.room_for_a_shutter)
+@operator("Duplicate Shutter", needs.a_shutter, needs.room_for_a_shutter, icon="DUPLICATE")
 def shutter_duplicate(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Add a copy of the active shutter, keyframes included"""
     shutter_edits.duplicate_shutter(effect, effect.active_shutter)
@@ -147,7 +148,7 @@ def _why_last(effect: PropertyGroup) -> str | None:
     return rpt_("The last shutter of an effect cannot be removed") if len(effect.shutters) == 1 else None
 
 
-@operator("Remove Shutter", _why_last, needs.a_shutter)
+@operator("Remove Shutter", _why_last, needs.a_shutter, icon="REMOVE")
 def shutter_remove(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Remove the active shutter and its regions"""
     shutter_edits.remove_shutter(effect, effect.active_shutter)
@@ -182,19 +183,19 @@ def _presets(_context: Context) -> list[tuple]:
 _PRESET = EnumProperty(name="Preset", items=_presets, translation_context=CONTEXT)
 
 
-@operator("Apply Shutter Preset", needs.a_shutter, preset=_PRESET)
+@operator("Apply Shutter Preset", needs.a_shutter, icon="PRESET", preset=_PRESET)
 def preset(self: Operator, context: Context, effect: PropertyGroup) -> None:
     """Give the active shutter the bars of a preset"""
     shutter_edits.apply_preset(effect, effect.active_shutter, self.preset, bar_edits.auto_key(context))
 
 
-@operator("Insert Bar Keyframes", needs.a_shutter)
+@operator("Insert Bar Keyframes", needs.a_shutter, icon="KEY_HLT")
 def bars_key(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Insert keyframes for all bars of the active shutter at the current frame"""
     bar_edits.key_bars(effect, effect.active_shutter)
 
 
-@operator("Delete Bar Keyframes", needs.a_shutter)
+@operator("Delete Bar Keyframes", needs.a_shutter, icon="KEY_DEHLT")
 def bars_unkey(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
     """Delete the keyframes of all bars of the active shutter at the current frame"""
     if not bar_edits.unkey_bars(effect, effect.active_shutter):
@@ -251,6 +252,7 @@ class SHUTTER_OT_draw(MakesEffect, OfEffect, Operator):
     """Draw on the sharp frame where the active shutter is used (at another frame, this redraws the active region)"""
 
     bl_label = "Draw"
+    icon = "GREASEPENCIL"
     only_seen = True
     needs = needs.a_shutter, _why_no_room
 
@@ -336,7 +338,7 @@ def region_assign(self: Operator, _context: Context, effect: PropertyGroup) -> N
     region_edits.assign_region(effect, effect.active_region, effect.shutters[int(self.shutter)])
 
 
-@operator("Remove Region", needs.a_region)
+@operator("Remove Region", needs.a_region, icon="REMOVE")
 def region_remove(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Remove the active region and its strokes"""
     region_edits.remove_region(effect, effect.active_region)
@@ -350,19 +352,19 @@ def region_move(self: Operator, _context: Context, effect: PropertyGroup) -> set
     return _move(places, effect.active_region, self.direction, partial(region_edits.move_region, effect))
 
 
-@operator("Insert Region Keyframes", needs.a_region)
+@operator("Insert Region Keyframes", needs.a_region, icon="KEY_HLT")
 def region_key(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Insert keyframes for location, rotation and scale of the active region at the current frame"""
     region_edits.key_region(effect, effect.active_region)
 
 
-@operator("Choose Source", strip=STRIP)
+@operator("Choose Source", icon="SEQUENCE", strip=STRIP)
 def source(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Choose the movie, image or clip strip whose frames the effect exposes"""
     add_effect.choose_source(effect, self.effect_strip, self.edit.sequence_editor.strips_all[self.strip])
 
 
-@operator("Copy Effect", options={"REGISTER"})
+@operator("Copy Effect", icon="COPYDOWN", options={"REGISTER"})
 def effect_copy(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Copy the shutters, regions, keyframes and options of the effect, for other strips and scenes of this file"""
     undelete.copy(effect, self.effect_strip)
@@ -374,6 +376,7 @@ class SHUTTER_OT_effect_paste(MakesEffect, OfEffect, Operator):
     """Paste the copied effect to the active strip, replacing its effect"""
 
     bl_label = "Paste Effect"
+    icon = "PASTEDOWN"
 
     @classmethod
     def refusal(cls, context: Context) -> str | None:
@@ -387,6 +390,7 @@ class SHUTTER_OT_recipe_import(OfEffect, ImportHelper, Operator):
     """Replace the shutters, regions, keyframes and options of the effect with those of a recipe file"""
 
     bl_label = "Import Recipe"
+    icon = "IMPORT"
     filename_ext = ".json"
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
@@ -402,6 +406,7 @@ class SHUTTER_OT_recipe_export(OfEffect, ExportHelper, Operator):
     """Save the shutters, regions, keyframes and options of the effect as a recipe file"""
 
     bl_label = "Export Recipe"
+    icon = "EXPORT"
     bl_options = {"REGISTER"}
     filename_ext = ".json"
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
@@ -423,6 +428,7 @@ class SHUTTER_OT_copy_report(Named, Operator):
     """Copy versions, device, types and numbers of the edit, and last errors: no names, no paths. Nothing is sent"""
 
     bl_label = "Copy Report"
+    icon = "COPYDOWN"
 
     def execute(self, context: Context) -> set[str]:
         if bpy.app.background:

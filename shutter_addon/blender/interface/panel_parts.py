@@ -5,9 +5,7 @@ from typing import Any
 
 import bpy.utils.previews
 import numpy as np
-from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_iface as iface_
-from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import Context, Menu, PropertyGroup, Scene, Strip, UILayout
 from bpy.utils.previews import ImagePreviewCollection
@@ -91,31 +89,24 @@ def draw_list(
     if menu:
         column.menu(menu, text="", icon="DOWNARROW_HLT")
     elif len(items) > 1:
-        draw_moves(column, kind, has_text=False)
+        for direction, icon in (("UP", "TRIA_UP"), ("DOWN", "TRIA_DOWN")):
+            column.operator(f"shutter.{kind}_move", text="", icon=icon).direction = direction
 
 
-def draw_moves(layout: UILayout, kind: str, *, has_text: bool = True) -> None:
-    """Draw the buttons that move the active shutter or region in its list."""
-    ways = (
-        ("UP", n_("Move Up", contexts.operator_default), "TRIA_UP"),
-        ("DOWN", n_("Move Down", contexts.operator_default), "TRIA_DOWN"),
-    )
-    for direction, text, icon in ways:
-        layout.operator(f"shutter.{kind}_move", text=text if has_text else "", icon=icon).direction = direction
+def draw_operators(layout: UILayout, *names: str) -> None:
+    """Draw operators of the extension, and a separator for "".
 
-
-def draw_operators(layout: UILayout, *entries: tuple[str, ...]) -> None:
-    """Draw operators of the extension. An entry has a name, an icon and a property whose items become a submenu."""
-    for entry in entries:
-        _draw_operator(layout, *entry)
-
-
-def _draw_operator(layout: UILayout, name: str, icon: str = "NONE", prop: str = "") -> None:
-    """prop: whose items are a menu of their own"""
-    if prop:
-        layout.operator_menu_enum(f"shutter.{name}", prop, icon=icon)
-    else:
-        layout.operator(f"shutter.{name}", icon=icon)
+    An operator's `icon` is beside it, and the items of its property `choices` are a submenu.
+    """
+    for name in names:
+        if not name:
+            layout.separator()
+            continue
+        kind = getattr(bpy.types, f"SHUTTER_OT_{name}")
+        if kind.choices and kind.poll(bpy.context):
+            layout.operator_menu_enum(f"shutter.{name}", kind.choices, icon=kind.icon)
+        else:  # greyed out, its tooltip says why
+            layout.operator(f"shutter.{name}", icon=kind.icon)
 
 
 def draw_properties(layout: UILayout, owner: bpy.types.bpy_struct, *names: str) -> None:

@@ -19,7 +19,6 @@ from .panel_parts import (
     WIDEST,
     draw_fields,
     draw_list,
-    draw_moves,
     draw_operators,
     draw_properties,
     menu,
@@ -88,26 +87,15 @@ def region_menu(layout: UILayout, _context: Context) -> None:
     subject.new, subject.kind = True, "SUBJECT"
     outline = layout.operator("shutter.draw", text="Draw Outline", icon=_ICONS["OUTLINE"])
     outline.new, outline.kind = True, "OUTLINE"
-    layout.separator()
-    draw_operators(layout, ("matte_add", "FILE_MOVIE"), ("matte_strip", "SEQUENCE", "strip"))
-    # Without a mask they are greyed out, and the tooltip says why.
-    mask = ("mask",) if bpy.data.masks else ()
-    draw_operators(layout, ("matte_mask", "MOD_MASK", *mask), ("outline_from_mask", _ICONS["OUTLINE"], *mask))
-    draw_operators(layout, ("ramp_add", "IPO_EASE_IN_OUT", "ramp"))
-    layout.separator()
-    draw_operators(layout, ("time_map", "TIME", "ramp"), ("rolling_shutter", "CAMERA_DATA", "side"))
-    draw_operators(layout, ("find_readout", "VIEWZOOM", "reads"))
+    draw_operators(layout, "", "matte_add", "matte_strip", "matte_mask", "outline_from_mask", "ramp_add")
+    draw_operators(layout, "", "time_map", "rolling_shutter", "find_readout")
 
 
 @menu("shutters", "Shutter Specials")
 def shutter_menu(layout: UILayout, _context: Context) -> None:
     layout.menu("SHUTTER_MT_presets", icon="PRESET")
-    layout.separator()
-    draw_operators(layout, ("shutter_duplicate", "DUPLICATE"))
-    draw_moves(layout, "shutter")
-    layout.separator()
-    draw_operators(layout, ("effect_copy", "COPYDOWN"), ("effect_paste", "PASTEDOWN"))
-    draw_operators(layout, ("recipe_import", "IMPORT"), ("recipe_export", "EXPORT"))
+    draw_operators(layout, "", "shutter_duplicate", "shutter_move")
+    draw_operators(layout, "", "effect_copy", "effect_paste", "recipe_import", "recipe_export")
 
 
 class _Shutters(Mixin):
@@ -119,21 +107,21 @@ class _Shutters(Mixin):
         layout = self.layout
         active = selection.active(context)
         if active is None:
-            draw_operators(layout, ("draw", "GREASEPENCIL"), ("add_effect", "ADD"))
+            draw_operators(layout, "draw", "add_effect")
             return
         effect = active[1]
         _draw_live(layout, context)
         _draw_source(layout, effect)
         draw_list(layout, effect, "shutter", effect.shutters, "SHUTTER_MT_shutters")
         row = layout.row(align=True)
-        draw_operators(row, ("draw", "GREASEPENCIL"))
+        draw_operators(row, "draw")
         region = selection.active_region(effect)
         if is_subject := region is not None and region.kind == "SUBJECT":
             row.operator("shutter.draw", text="Not This", icon="X").not_this = True
-        draw_operators(row, ("erase",))
+        draw_operators(row, "erase")
         row.menu("SHUTTER_MT_regions", text="", icon="DOWNARROW_HLT")
         region_panels.draw_tracking(layout, effect.active_region, is_subject)
-        draw_operators(layout.row(align=True), ("sharp_subject",), ("panning_shot",), ("clean_trail",))
+        draw_operators(layout.row(align=True), "sharp_subject", "panning_shot", "clean_trail")
 
 
 def _draw_header(self: Panel, context: Context) -> None:
@@ -162,7 +150,7 @@ def _draw_exposure(layout: UILayout, scene: Scene, effect: PropertyGroup, strip:
         layout.prop(shutter, "trail")
     _draw_combine(layout, shutter)
     draw_fields(layout, shutter, Shutter)
-    layout.operator("shutter.tripod", icon="CON_CAMERASOLVER")
+    draw_operators(layout, "tripod")
     _draw_bars(layout, scene, effect, strip)
 
 
@@ -302,7 +290,7 @@ class _Report(Mixin):
     bl_options = {"HIDE_HEADER"}
 
     def draw(self, _context: Context) -> None:
-        self.layout.operator("shutter.copy_report", icon="COPYDOWN")
+        draw_operators(self.layout, "copy_report")
 
 
 class _InProperties:

@@ -1,4 +1,4 @@
-"""Handles that move, rotate and scale the active region in the preview, and the operator that does it by numbers."""
+"""Handles that move, rotate and scale the active region in the preview."""
 
 from typing import NamedTuple
 
@@ -6,18 +6,17 @@ import bpy
 import numpy as np
 from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_iface as iface_
-from bpy.types import Context, Event, Gizmo, GizmoGroup, Operator, PropertyGroup, Scene, Strip
+from bpy.types import Context, Event, Gizmo, GizmoGroup, PropertyGroup, Scene, Strip
 
 from ...core import revision
 from ...core.messages import EffectError
 from ...core.model import scribbles
 from ..data import selection, snapshot, validation
-from ..data.properties import location_property, rotation_property, scale_property
 from ..editing import bar_edits, drawn_places, region_edits, track_region
 from ..editing.motion_keys import MotionKeys
-from . import drawing, needs
+from . import drawing
 from .gizmo_groups import TWEAK, Dragged, View, WithKeys, view
-from .operator_bases import OfEffect, popup
+from .operator_bases import popup
 
 _RADIUS = 7  # interface units: radius of a handle
 _NEAREST = 0.03  # fraction of the picture: least distance between the two handles
@@ -193,34 +192,3 @@ class SHUTTER_GGT_region(WithKeys, GizmoGroup):
     def setup(self, _context: Context) -> None:
         for turns in (False, True):
             self.gizmos.new(SHUTTER_GT_region.__name__).turns = turns
-
-
-class SHUTTER_OT_region_transform(OfEffect, Operator):
-    """Move, rotate and scale the active region by numbers, like its handles in the preview"""
-
-    bl_label = "Transform Region"
-    needs = (needs.a_region,)
-
-    location: location_property("Distance from where the region was drawn, as a fraction of the picture", step=1)
-    rotation: rotation_property("Rotation about the region's center")
-    scale: scale_property("Scale about the region's center")
-
-    def invoke(self, context: Context, _event: Event) -> set[str]:
-        region = selection.active_region(selection.active(context)[1])
-        self.location, self.rotation, self.scale = region.location, region.rotation, region.scale
-        return context.window_manager.invoke_props_dialog(self)
-
-    def draw(self, _context: Context) -> None:
-        layout = self.layout
-        layout.activate_init = True  # Blender ignores it with a property split or for a vector
-        layout.prop(self, "location", index=0, text="Location X")
-        layout.prop(self, "location", index=1, text="Location Y")
-        layout.prop(self, "rotation")
-        layout.prop(self, "scale")
-
-    def change(self, context: Context, effect: PropertyGroup) -> None:
-        index, region = effect.active_region, selection.active_region(effect)
-        drawn_places.hold(effect, index)
-        region.location, region.rotation, region.scale = self.location, self.rotation, self.scale
-        if wants_keys(context, effect, index):
-            region_edits.key_region(effect, index)

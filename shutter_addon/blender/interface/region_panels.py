@@ -15,9 +15,9 @@ from .panel_parts import draw_list, draw_operators, draw_properties, sentence
 _PLACEMENT = "location", "rotation", "scale"
 _TRACKING = "motion", "track_until", "track_all_keys", "track_ends"
 _BUTTONS = {  # operators of each kind with drawings
-    "LINE": (("subject_find",), ("outline_it",)),
-    "OUTLINE": (("outline_it",), ("outline_needed",)),
-    "SUBJECT": (("subject_outline", "CURVE_BEZCIRCLE"), ("subject_scribble", "IPO_LINEAR")),
+    "LINE": ("subject_find", "outline_it"),
+    "OUTLINE": ("outline_it", "outline_needed"),
+    "SUBJECT": ("subject_outline", "subject_scribble"),
 }
 _OF_KIND = {"LINE": "width", "OUTLINE": "between", "RAMP": "ramp"}  # the property that only this kind has
 
@@ -79,7 +79,7 @@ def _draw_blend(layout: UILayout, region: PropertyGroup) -> None:
         row = layout.row()
         row.active = name != "blend" or not region.is_layer  # a layer covers all of them
         row.prop(region, name)
-    layout.operator("shutter.matte_export")
+    draw_operators(layout, "matte_export")
 
 
 def draw_tracking(layout: UILayout, index: int | None, is_subject: bool = False) -> None:
@@ -156,7 +156,7 @@ def draw_follow(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: 
     draw_properties(layout, region, "follow_clip", "follow_kind")
     if region.follow_clip is not None:
         _draw_tracks(layout, region, region.follow_clip.tracking)
-    layout.operator("shutter.follow", icon="TRACKER")
+    draw_operators(layout, "follow")
 
 
 def _draw_tracks(layout: UILayout, region: PropertyGroup, tracking: MovieTracking) -> None:

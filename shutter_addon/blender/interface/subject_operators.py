@@ -24,13 +24,13 @@ def subject_find(self: Operator, _context: Context, effect: PropertyGroup) -> se
     return None
 
 
-@operator("Scribble", needs.a_subject)
+@operator("Scribble", needs.a_subject, icon="IPO_LINEAR")
 def subject_scribble(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Make the active subject a scribble: its strokes, as wide as the region's width"""
     effect.regions[effect.active_region].kind = "LINE"
 
 
-@operator("Outline", needs.a_subject, only_seen=True)
+@operator("Outline", needs.a_subject, icon="CURVE_BEZCIRCLE", only_seen=True)
 def subject_outline(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
     """Make the active subject an outline, which is drawn where the subject has strokes"""
     if not subjects.to_outline(self.edit, effect, self.effect_strip, effect.active_region):

@@ -154,6 +154,7 @@ class SHUTTER_OT_track(_Tracks, OfEffect, Operator):
     """Track what the active region covers here, up to your own keyframes (Esc stops and keeps the tracked frames)"""
 
     bl_label = "Track Region"
+    choices = "direction"
     needs = (needs.strokes,)
 
     direction: _DIRECTION
@@ -163,6 +164,7 @@ class SHUTTER_OT_track_camera(_Tracks, OfEffect, Operator):
     """Track the camera outside the regions, up to your own keyframes (Esc stops and keeps the tracked frames)"""
 
     bl_label = "Track Camera"
+    choices = "direction"
     is_camera = True
 
     direction: _DIRECTION
@@ -185,6 +187,7 @@ class SHUTTER_OT_tripod(_Tracks, OfEffect, Operator):
 
     bl_label = "Stabilize Exposure"
     needs = (needs.a_shutter,)
+    icon = "CON_CAMERASOLVER"
     is_camera = True
     direction = "BOTH"
     once = True
@@ -232,7 +235,7 @@ def _why_no_clip(effect: PropertyGroup) -> str | None:
     return None if has_clip else rpt_("Choose a clip first")
 
 
-@operator("Follow Track", needs.strokes, _why_no_clip)
+@operator("Follow Track", needs.strokes, _why_no_clip, icon="TRACKER")
 def follow(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Key the active region by a track of a movie clip, from its place at this frame"""
     follow_track.follow(self.edit, effect, self.effect_strip, effect.active_region)

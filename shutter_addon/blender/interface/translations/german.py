@@ -210,8 +210,6 @@ MESSAGES = {
     ("*", "Remove the active shutter and its regions"): "Den aktiven Verschluss und seine Regionen entfernen",
     ("*", "The last shutter of an effect cannot be removed"): "Der letzte Verschluss eines Effekts bleibt",
     ("Operator", "Move Shutter"): "Verschluss verschieben",
-    ("Operator", "Move Up"): "Nach oben",
-    ("Operator", "Move Down"): "Nach unten",
     (
         "*",
         "Move the active shutter in the list (the first one is the default, used where nothing is drawn)",
