@@ -1,36 +1,17 @@
 """Everything that uses bpy: properties, the engine, strips, commands."""
 
 from importlib import import_module
+from pkgutil import iter_modules
 from types import ModuleType
 
 import bpy
 
+from . import interface
+
 # The classes of each are registered (classes_of), then its `register` is called.
-_MODULES = (
-    "devices.main_thread",
-    "interface.translations",
-    "data.preferences",
-    "data.properties",
-    "data.movie_decoding",
-    "rendering.engine",
-    "interface.panel_parts",
-    "interface.sharp_frame",
-    "interface.preview",
-    "interface.operators",
-    "interface.track_operators",
-    "interface.matte_operators",
-    "interface.bake_operators",
-    "interface.full_quality",
-    "interface.panels",
-    "interface.menus",
-    "interface.gizmo_groups",
-    "interface.bar_editor",
-    "interface.region_gizmo",
-    "interface.outline_operators",
-    "interface.subject_operators",
-    "interface.probe_gizmo",
-    "handlers",
-)
+_DATA = "data.preferences", "data.properties", "data.movie_decoding"
+_INTERFACE = [f"interface.{module.name}" for module in iter_modules(interface.__path__)]
+_MODULES = "devices.main_thread", *_DATA, "rendering.engine", *_INTERFACE, "handlers"
 _modules = [import_module(f".{name}", __package__) for name in _MODULES]
 _commands: list = []
 

@@ -1,6 +1,5 @@
 """Operators for mattes, ramps, time maps and rolling shutters."""
 
-from contextlib import ExitStack
 from pathlib import Path
 
 import bpy
@@ -191,15 +190,9 @@ _READS = EnumProperty(
 
 
 @operator("Find Readout", _why_no_repair, icon="VIEWZOOM", reads=_READS)
-def find_readout(self: Operator, context: Context, effect: PropertyGroup) -> None:
+def find_readout(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Find the sensor's readout time from lines that lean while they move around the current frame, and repair it"""
-    with ExitStack() as after:
-        if (window := context.window) is not None:
-            window.cursor_modal_set("WAIT")
-            after.callback(window.cursor_modal_restore)
-        found, side = rolling_shutter.find(
-            self.edit, effect, self.effect_strip, "TOP" if self.reads == "ROWS" else "LEFT"
-        )
+    found, side = rolling_shutter.find(self.edit, effect, self.effect_strip, "TOP" if self.reads == "ROWS" else "LEFT")
     rolling_shutter.repair(self.edit, effect, self.effect_strip, min(abs(found), 1.0), side)
     name = next(name for word, name, _ in SIDES if word == side)
     percent = round(100 * abs(found))

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import bpy
 from bpy.app.translations import contexts
-from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 from bpy.types import Context, Event, Operator, PropertyGroup
@@ -22,6 +21,7 @@ from ..editing import add_effect, bar_edits, drawn_places, region_edits, shown_a
 from ..editing import match_source as matching
 from ..output import error_report, matte_export
 from . import needs, sharp_frame
+from .bar_editor import bar_under
 from .matte_operators import STRIP
 from .operator_bases import (
     UNDOABLE,
@@ -35,7 +35,7 @@ from .operator_bases import (
     report_error,
     report_warning,
 )
-from .panel_parts import icon_of
+from .panel_parts import draw_properties, icon_of
 
 
 def why_no_effect(context: Context) -> str | None:
@@ -214,17 +214,12 @@ class SHUTTER_OT_bar_set(OfEffect, Operator):
     weight: FloatProperty(name="Weight", description="Contribution of the bar's frame", min=0.0, soft_max=1.0)
 
     def invoke(self, context: Context, event: Event) -> set[str]:
-        from .bar_editor import bar_under
-
-        is_clicked = event.value == "DOUBLE_CLICK"  # from a menu, the pointer is anywhere
-        place = bar_under(context, event.mouse_region_x, event.mouse_region_y) if is_clicked else None
-        self.is_pointed_at = place is not None
-        if place is not None:
-            self.bar = place + 1
+        if event.value == "DOUBLE_CLICK":  # from a menu, the pointer is anywhere
+            place = bar_under(context, event.mouse_region_x, event.mouse_region_y)
+            self.bar = self.bar if place is None else place + 1
         if self.tried(self._read, selection.active(context)[1]) == {"CANCELLED"}:
             return {"CANCELLED"}
-        title = iface_("Bar {number}").format(number=self.bar) if self.is_pointed_at else ""
-        return context.window_manager.invoke_props_dialog(self, width=200, title=title)
+        return context.window_manager.invoke_props_dialog(self, width=200)
 
     def _read(self, effect: PropertyGroup) -> None:
         bars = bar_edits.bars_now(effect, effect.active_shutter)
@@ -232,9 +227,7 @@ class SHUTTER_OT_bar_set(OfEffect, Operator):
 
     def draw(self, _context: Context) -> None:
         self.layout.activate_init = True
-        if not getattr(self, "is_pointed_at", False):  # from a menu
-            self.layout.prop(self, "bar")
-        self.layout.prop(self, "weight")
+        draw_properties(self.layout, self, "weight", "bar")
 
     def change(self, context: Context, effect: PropertyGroup) -> None:
         weights = bar_edits.bars_now(effect, effect.active_shutter)

@@ -14,6 +14,7 @@ from ..data import annotations, preview_areas
 from ..devices import blender_gpu
 from ..rendering import effect_source, previews, sessions
 from . import drawing
+from .drawing import Box
 from .gizmo_groups import Dragged, InPreview, View, view
 
 _WIDTH, _HEIGHT, _LINE, _PAD, _APART = 180, 64, 17, 8, 14  # interface units
@@ -50,22 +51,8 @@ def probed_at(renderer: Renderer, request: Request, point: Sequence[float]) -> P
     return Probed(coefficients=coefficients, bars=compositor.mixed_shutter(state, coefficients))
 
 
-@dataclass(frozen=True)
-class Layout:
-    """Where the probe's box, bars and lines of text lie, in pixels of the region.
-
-    Attributes:
-        frame, bars: left, bottom, right, top.
-        lines: bottom of each line, from the top down.
-    """
-
-    frame: tuple[float, float, float, float]
-    bars: tuple[float, float, float, float]
-    lines: tuple[float, ...]
-
-
-def layout(point: Sequence[float], size: tuple[int, int], count: int, unit: float) -> Layout:
-    """Return the layout of the probe at a point of a region.
+def layout(point: Sequence[float], size: tuple[int, int], count: int, unit: float) -> tuple[Box, Box, list[float]]:
+    """Return the probe's box at a point of a region, the box of its bars, and the bottom of each line of text.
 
     The box lies at the lower right of the point, or on the other side if there is no room.
 
@@ -81,8 +68,8 @@ def layout(point: Sequence[float], size: tuple[int, int], count: int, unit: floa
     top = y - apart if y - apart - height >= 0 else y + apart + height
     left, top = max(left, 0.0), max(min(top, size[1]), height)
     bars = left + pad, top - pad - _HEIGHT * unit, left + width - pad, top - pad
-    lines = tuple(bars[1] - pad - (i + 1) * _LINE * unit for i in range(count))
-    return Layout((left, top - height, left + width, top), bars, lines)
+    lines = [bars[1] - pad - (i + 1) * _LINE * unit for i in range(count)]
+    return (left, top - height, left + width, top), bars, lines
 
 
 def _view(context: Context) -> View | None:
@@ -127,16 +114,16 @@ class SHUTTER_GT_probe(Gizmo):
 
 def _draw(region: Region, point: Sequence[float], shutters: Sequence[PropertyGroup], probed: Probed) -> None:
     unit = drawing.ui_scale()
-    place = layout(point, (region.width, region.height), len(shutters), unit)
+    frame, bars, lines = layout(point, (region.width, region.height), len(shutters), unit)
     colors = np.array([shutter.color for shutter in shutters])
     (x, y), arm = point, 6 * unit
     drawing.lines([(x - arm, y), (x + arm, y)], _MARK, width=1)
     drawing.lines([(x, y - arm), (x, y + arm)], _MARK, width=1)
-    drawing.rectangles([place.frame], [drawing.BACK])
+    drawing.rectangles([frame], [drawing.BACK])
     shares = probed.bars / max(1.0, probed.bars.max())
-    drawing.bars(place.bars, shares, (*(probed.coefficients @ colors), 0.95))
-    left, _, right, _ = place.bars
-    for i, (bottom, shutter, share) in enumerate(zip(place.lines, shutters, probed.coefficients, strict=True)):
+    drawing.bars(bars, shares, (*(probed.coefficients @ colors), 0.95))
+    left, _, right, _ = bars
+    for i, (bottom, shutter, share) in enumerate(zip(lines, shutters, probed.coefficients, strict=True)):
         drawing.swatch(left, bottom - unit, 12 * unit, shutter, i)
         drawing.text(left + 18 * unit, bottom, shutter.name, until=right - 44 * unit)
         drawing.text(right - 38 * unit, bottom, f"{share:.1%}")

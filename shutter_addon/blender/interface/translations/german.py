@@ -299,7 +299,6 @@ MESSAGES = {
     ("*", "No bar has a keyframe at the current frame"): "Kein Balken hat beim aktuellen Bild ein Schlüsselbild",
     ("Operator", "Set Bar Weight"): "Balkengewicht setzen",
     ("*", "Set the weight of a bar as a number"): "Das Gewicht eines Balkens als Zahl setzen",
-    ("*", "Bar {number}"): "Balken {number}",
     ("*", "Bar"): "Balken",
     ("*", "Number of the bar, from 1"): "Nummer des Balkens, ab 1",
     ("*", "Weight"): "Gewicht",
@@ -1080,9 +1079,6 @@ MESSAGES = {
         "*",
         "the picture is too unlike those before; tracking goes on from here",
     ): "das Bild ist denen davor zu unähnlich; von hier aus geht die Verfolgung weiter",
-    ("*", "Not tracked: from frame {first} on"): "Nicht verfolgt: ab Bild {first}",
-    ("*", "Not tracked: up to frame {last}"): "Nicht verfolgt: bis Bild {last}",
-    ("*", "Not tracked: frames {first} to {last}"): "Nicht verfolgt: Bilder {first} bis {last}",
     ("*", "Fade Out When Lost"): "Ausblenden, wenn verloren",
     (
         "*",
