@@ -157,14 +157,14 @@ def test_the_next_drawing_needed(bpy, chosen):
 
 
 def test_one_drawing_says_where_the_next_is_needed(bpy, chosen, monkeypatch):
-    """Where half of the doubt lies on each side, not beside the drawing and not at the farthest frame."""
+    """In the middle of the least confident frames, not beside the drawing."""
     strip, effect = chosen(1)
     assert bpy.ops.shutter.outline_needed() in ({"FINISHED"}, {"CANCELLED"})
     sure = [1.0, 0.9, 0.9, 0.7, 0.7, 0.6, 0.4, 0.2, 0.0, 0.0, 0.0, None]
     monkeypatch.setattr(CarriedMattes, "confidence", lambda _self, number: sure[number])
-    assert outline_drawings.next_needed(strip.id_data, effect, strip, 0) == (9, 0.0)
+    assert outline_drawings.next_needed(strip.id_data, effect, strip, 0) == (11, 0.0)
     sure[6:] = [0.9] * 6
-    assert outline_drawings.next_needed(strip.id_data, effect, strip, 0) == (5, 0.7)
+    assert outline_drawings.next_needed(strip.id_data, effect, strip, 0) == (6, 0.6)
 
 
 def test_what_is_needed_of_straight_ones(bpy, chosen):

@@ -153,7 +153,7 @@ def _draw() -> None:
         try:
             previews.refine()
         except effect_source.FAULTS as error:
-            _tell_fault(error, say)
+            say(rpt_("Shutter: {fault}").format(fault=error))
         _draw_notes(context.region, notes)
 
 
@@ -181,7 +181,7 @@ def _show(context: Context, shown: Shown, decision: Decision | None, say: Say) -
             main_thread.later(preview_areas.redraw)
     except effect_source.FAULTS as error:
         previews.was_drawn()
-        _tell_fault(error, say)
+        say(rpt_("Shutter: {fault}").format(fault=error))
 
 
 def _tell_unseen(context: Context, say: Say) -> None:
@@ -206,15 +206,15 @@ def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, s
         quad.draw("PICTURE", {"picture": texture}, wanted.left, 1.0, opacity=shown.strip.blend_alpha)
     colors = [shutter.color for shutter in shown.effect.shutters]
     if settings.view == "SCRIBBLES":
-        _show_scribbles(quad, colors, renderer.drawn_labels(request), renderer)
-    elif settings.view == "COEFFICIENTS":
-        _show_coefficients(quad, colors, renderer, request, "COEFFICIENTS", 0.75)
-    else:
-        if settings.view == "HOLES":
-            holes = renderer.drawn_holes(replace(request, quick=True, levels=True))
-            _show_scribbles(quad, _HOLES, holes, renderer)
-        if settings.view == "EDGES":
-            _show_coefficients(quad, colors, renderer, request, "EDGES", 1.0)
+        _show_shares(quad, "SCRIBBLES", colors, renderer.drawn_labels(request), renderer, 0.7)
+    elif settings.view == "HOLES":
+        holes = renderer.drawn_holes(replace(request, quick=True, levels=True))
+        _show_shares(quad, "SCRIBBLES", _HOLES, holes, renderer, 0.7)
+    elif settings.view in ("COEFFICIENTS", "EDGES"):
+        opacity, unit = 1.0 if settings.view == "EDGES" else 0.75, float(drawing.ui_scale())
+        drawn, count = renderer.drawn_with_layers(replace(request, quick=True)), len(request.state.bars)
+        _show_shares(quad, settings.view, colors, drawn, renderer, opacity, count=count, unit=unit)
+    if settings.view not in ("SCRIBBLES", "COEFFICIENTS"):
         _show_strokes(context, quad, shown, wanted.decision.snapshot)
     previews.was_drawn()
     _tell_carrying(say)
@@ -287,7 +287,7 @@ def _tell_carrying(say: Say) -> None:
     """Track missing mattes of outlines, and add a note on the progress."""
     fault, progress = outline_carrying.begin(show_carried), outline_carrying.progress()
     if fault is not None:
-        _tell_fault(fault, say)
+        say(rpt_("Shutter: {fault}").format(fault=fault))
     if progress is not None:
         done, total = progress
         say(rpt_("Tracking the outline: {done} of {total} frames").format(done=done, total=total))
@@ -298,11 +298,6 @@ def show_carried() -> None:
     sessions.WINDOW.keep(set())
     invalidation.drop_frames()
     preview_areas.redraw()
-
-
-def _tell_fault(error: Exception | str, say: Say) -> None:
-    """Add a note why there is no picture."""
-    say(rpt_("Shutter: {fault}").format(fault=error))
 
 
 def _show_strokes(context: Context, quad: Quad, shown: Shown, snapshot: Snapshot) -> None:
@@ -336,22 +331,13 @@ def _show_source(quad: Quad, shown: Shown, renderer: Renderer, request: Request,
     quad.draw("PICTURE", {"picture": texture}, 0.0, right, opacity=shown.strip.blend_alpha)
 
 
-def _show_scribbles(quad: Quad, colors: Colors, drawn: tuple[object, int], renderer: Renderer) -> None:
-    """Draw a picture of labels in their colors."""
-    labels, block = drawn
-    size = renderer.source.width, renderer.source.height
-    textures = {"labels": labels, "palette": _palette(colors)}
-    quad.draw("SCRIBBLES", textures, opacity=0.7, block=block, size=size)
-
-
-def _show_coefficients(
-    quad: Quad, colors: Colors, renderer: Renderer, request: Request, step: str, opacity: float
+def _show_shares(
+    quad: Quad, step: str, colors: Colors, drawn: tuple[Texture, int], renderer: Renderer, opacity: float, **more
 ) -> None:
-    coefficients, block = renderer.drawn_with_layers(replace(request, quick=True))
-    textures = {"coefficients": coefficients, "palette": _palette(colors)}
-    count, unit = len(request.state.bars), float(drawing.ui_scale())
-    size = renderer.source.width, renderer.source.height
-    quad.draw(step, textures, opacity=opacity, block=block, count=count, size=size, unit=unit)
+    """Draw a picture of labels or coefficients in their colors."""
+    (texture, block), source = drawn, renderer.source
+    textures = {"labels" if step == "SCRIBBLES" else "coefficients": texture, "palette": _palette(colors)}
+    quad.draw(step, textures, opacity=opacity, block=block, size=(source.width, source.height), **more)
 
 
 def _palette(palette: Colors) -> Texture:

@@ -1,7 +1,7 @@
 """Gizmos of the probe, which shows the shutter of a pixel, and of the handle of the split view."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import bpy
 import numpy as np
@@ -22,16 +22,8 @@ _REACH = 8  # interface units from the pointer to the split's handle
 _MARK = (1.0, 1.0, 1.0, 0.9)
 
 
-@dataclass(frozen=True)
-class Probed:
-    """A pixel's coefficients (N,), which sum to 1, and the bars (L,) of its shutter."""
-
-    coefficients: np.ndarray
-    bars: np.ndarray
-
-
-def probed_at(renderer: Renderer, request: Request, point: Sequence[float]) -> Probed | None:
-    """Return what a pixel is made of; None: the point is outside the picture.
+def probed_at(renderer: Renderer, request: Request, point: Sequence[float]) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return a pixel's coefficients (N,), which sum to 1, and the bars (L,) of its shutter; None: there is no pixel.
 
     It runs where Blender's GPU draws and reads one texel. Coefficients are solved only if something changed since they
     were drawn.
@@ -48,7 +40,7 @@ def probed_at(renderer: Renderer, request: Request, point: Sequence[float]) -> P
     values = np.maximum(values, 0).astype(np.float64)
     coefficients = values / values.sum()
     state = renderer.slid(request, known=True).state
-    return Probed(coefficients=coefficients, bars=compositor.mixed_shutter(state, coefficients))
+    return coefficients, compositor.mixed_shutter(state, coefficients)
 
 
 def layout(point: Sequence[float], size: tuple[int, int], count: int, unit: float) -> tuple[Box, Box, list[float]]:
@@ -102,7 +94,7 @@ class SHUTTER_GT_probe(Gizmo):
             return
         if probed is not None:
             (point,) = seen.on_region([at])
-            _draw(context.region, point, shown.effect.shutters, probed)
+            _draw(context.region, point, shown.effect.shutters, *probed)
 
     def test_select(self, context: Context, location: tuple[int, int]) -> int:
         """Follow the pointer: Blender calls this whenever it moves. No other callback leaves the events to others."""
@@ -112,7 +104,9 @@ class SHUTTER_GT_probe(Gizmo):
         return -1
 
 
-def _draw(region: Region, point: Sequence[float], shutters: Sequence[PropertyGroup], probed: Probed) -> None:
+def _draw(
+    region: Region, point: Sequence[float], shutters: Sequence[PropertyGroup], shares: np.ndarray, mixed: np.ndarray
+) -> None:
     unit = drawing.ui_scale()
     frame, bars, lines = layout(point, (region.width, region.height), len(shutters), unit)
     colors = np.array([shutter.color for shutter in shutters])
@@ -120,10 +114,9 @@ def _draw(region: Region, point: Sequence[float], shutters: Sequence[PropertyGro
     drawing.lines([(x - arm, y), (x + arm, y)], _MARK, width=1)
     drawing.lines([(x, y - arm), (x, y + arm)], _MARK, width=1)
     drawing.rectangles([frame], [drawing.BACK])
-    shares = probed.bars / max(1.0, probed.bars.max())
-    drawing.bars(bars, shares, (*(probed.coefficients @ colors), 0.95))
+    drawing.bars(bars, mixed / max(1.0, mixed.max()), (*(shares @ colors), 0.95))
     left, _, right, _ = bars
-    for i, (bottom, shutter, share) in enumerate(zip(lines, shutters, probed.coefficients, strict=True)):
+    for i, (bottom, shutter, share) in enumerate(zip(lines, shutters, shares, strict=True)):
         drawing.swatch(left, bottom - unit, 12 * unit, shutter, i)
         drawing.text(left + 18 * unit, bottom, shutter.name, until=right - 44 * unit)
         drawing.text(right - 38 * unit, bottom, f"{share:.1%}")

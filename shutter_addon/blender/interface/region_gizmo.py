@@ -152,23 +152,13 @@ class SHUTTER_GT_region(Dragged, Gizmo):
         if cancel:
             region.location, region.rotation, region.scale = self.before
             return
-        if wants_keys(context, effect, index):
-            _key(context, effect, index)
+        if bar_edits.auto_key(context) or MotionKeys(effect, index, region.motion).are_made():
+            try:
+                region_edits.key_region(effect, index)
+            except EffectError as error:  # gizmos have no reports
+                popup(context, str(error), icon="ERROR")
             context.area.tag_redraw()  # panels show whether it is keyed
         bpy.ops.ed.undo_push(message=iface_("Transform Region", contexts.operator_default))
-
-
-def wants_keys(context: Context, effect: PropertyGroup, index: int) -> bool:
-    """Return whether moving a region keys it: Auto Keying is on, or the region has keys from tracking."""
-    return bar_edits.auto_key(context) or MotionKeys(effect, index, effect.regions[index].motion).are_made()
-
-
-def _key(context: Context, effect: PropertyGroup, index: int) -> None:
-    """Key the region. Gizmos have no reports, so an error is a popup."""
-    try:
-        region_edits.key_region(effect, index)
-    except EffectError as error:
-        popup(context, str(error), icon="ERROR")
 
 
 def _is_drawing(context: Context) -> bool:
