@@ -17,7 +17,7 @@ from ..data import matte_content, recipe_import, selection, strips
 from ..editing import outline_drawings, region_edits, rolling_shutter, shutter_edits
 from ..output import matte_export
 from . import needs
-from .operator_bases import OfEffect, chosen_file, kept, operator
+from .operator_bases import OfEffect, chosen_file, given, kept, operator
 
 
 class SHUTTER_OT_matte_add(OfEffect, ImportHelper, Operator):
@@ -27,11 +27,8 @@ class SHUTTER_OT_matte_add(OfEffect, ImportHelper, Operator):
     icon = "FILE_MOVIE"
     needs = (needs.room_for_a_region,)
 
-    channel_name: StringProperty(
-        name="Channel Name",
-        description="Name of a channel of an EXR file; empty for the luminance",
-        maxlen=MAX_CHANNEL,
-        options={"SKIP_SAVE"},
+    channel_name: given(
+        StringProperty, "Channel Name", "Name of a channel of an EXR file; empty for the luminance", maxlen=MAX_CHANNEL
     )
     # What the file browser shows
     filter_movie: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
@@ -92,18 +89,13 @@ def outline_from_mask(self: Operator, _context: Context, effect: PropertyGroup) 
     outline_drawings.from_mask(self.edit, effect, self.effect_strip, shutter, _mask_named(self.mask))
 
 
-def _why_not_laid(effect: PropertyGroup) -> str | None:
-    is_laid = selection.active_region(effect).kind in strips.LAID
-    return None if is_laid else rpt_("The region is not a matte, ramp, outline or subject")
-
-
 class SHUTTER_OT_matte_export(OfEffect, ImportHelper, Operator):
     """Write the active matte or outline as pictures, one for each frame of its strip, for other programs"""
 
     bl_label = "Export Matte"
     icon = "EXPORT"
     bl_options = {"REGISTER"}
-    needs = needs.a_region, _why_not_laid
+    needs = (needs.a_cover,)
 
     directory: StringProperty(name="Folder", subtype="DIR_PATH", options={"SKIP_SAVE"})
     format: EnumProperty(

@@ -46,6 +46,15 @@ def popup(context: Context, words: str, **looks: str) -> None:
     show(lambda menu, _context: menu.layout.label(text=words, translate=False), **looks)
 
 
+def given(kind: Callable, name: str, description: str, **more: Any) -> Any:
+    """Return a property of an operator that buttons set. Blender would otherwise reuse the last button's value.
+
+    Args:
+        kind: of bpy.props.
+    """
+    return kind(name=name, description=description, options={"SKIP_SAVE"}, **more)
+
+
 def kept(items: Callable[[Context], Iterable[tuple]]) -> Callable[[object, Context], list[tuple]]:
     """Turn a function into the `items` of an EnumProperty. Blender needs the last list to stay in memory."""
     last: list[tuple] = []

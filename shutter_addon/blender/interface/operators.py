@@ -29,6 +29,7 @@ from .operator_bases import (
     Named,
     OfEffect,
     chosen_file,
+    given,
     kept,
     operator,
     redraw,
@@ -249,25 +250,9 @@ class SHUTTER_OT_draw(MakesEffect, OfEffect, Operator):
     only_seen = True
     needs = needs.a_shutter, _why_no_room
 
-    # SKIP_SAVE: Blender would otherwise reuse the values of the last button.
-    new: BoolProperty(
-        name="New Region",
-        description="Start a new region instead of adding strokes to the active one",
-        options={"SKIP_SAVE"},
-    )
-    kind: EnumProperty(
-        name="Type",
-        description="How the strokes cover the picture",
-        items=DRAWN,
-        translation_context=CONTEXT,
-        options={"SKIP_SAVE"},
-    )
-
-    not_this: BoolProperty(
-        name="Not This",
-        description="Draw on what the active subject is not",
-        options={"SKIP_SAVE"},
-    )
+    new: given(BoolProperty, "New Region", "Start a new region instead of adding strokes to the active one")
+    kind: given(EnumProperty, "Type", "How the strokes cover the picture", items=DRAWN, translation_context=CONTEXT)
+    not_this: given(BoolProperty, "Not This", "Draw on what the active subject is not")
 
     def change(self, context: Context, effect: PropertyGroup) -> None:
         region = selection.active_region(effect)

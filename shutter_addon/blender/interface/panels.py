@@ -283,16 +283,6 @@ def _draw_options(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip
         sentence(column, iface_("Smooth is off: the nearest source frame is used"), "INFO")
 
 
-class _Report(Mixin):
-    """The last panel, with or without an effect."""
-
-    bl_label = "Report"
-    bl_options = {"HIDE_HEADER"}
-
-    def draw(self, _context: Context) -> None:
-        draw_operators(self.layout, "copy_report")
-
-
 class _InProperties:
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
@@ -332,7 +322,6 @@ _PANELS = {
     "_camera": (of_effect("Camera", region_panels.draw_camera, region_panels.has_camera), ""),
     "_options": (of_effect("Options", _draw_options), ""),
     "_bake": (of_effect("Bake", bake_operators.draw_panel), ""),
-    "_report": (_Report, ""),
 }
 
 

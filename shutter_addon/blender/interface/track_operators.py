@@ -12,7 +12,7 @@ from ..data import selection, validation
 from ..editing import bar_edits, follow_track, outline_drawings, shutter_edits, track_region
 from ..rendering.effect_source import FAULTS
 from . import needs
-from .operator_bases import Beside, OfEffect, operator, redraw, report_warning, show_status
+from .operator_bases import Beside, OfEffect, given, operator, redraw, report_warning, show_status
 
 # Seconds: work between two redraws, at least and at most; waiting for the tracking thread.
 _TICK, _MOST, _PATIENCE = 0.05, 0.1, 0.02
@@ -24,13 +24,12 @@ DIRECTIONS = (
 )
 
 
-# SKIP_SAVE: Blender would otherwise reuse the direction of the last button.
-_DIRECTION = EnumProperty(
-    name="Direction",
-    description="Direction of tracking from the current frame",
+_DIRECTION = given(
+    EnumProperty,
+    "Direction",
+    "Direction of tracking from the current frame",
     items=DIRECTIONS,
     default="BOTH",
-    options={"SKIP_SAVE"},
     translation_context=CONTEXT,
 )
 
@@ -67,7 +66,6 @@ class _Tracks(Beside):
         self._steps = track_region.track(scene, effect, strip, index, self._frames, motion, **options)
         if not self._track(math.inf if waits else _TICK):
             return self._finish(context)
-        context.window_manager.progress_begin(0, len(self._frames))
         self._show(context)
         return self.go_on(context)
 
@@ -96,7 +94,6 @@ class _Tracks(Beside):
 
     def leave(self, context: Context) -> None:
         self._steps.close()
-        context.window_manager.progress_end()
         super().leave(context)
 
     def _track(self, seconds: float) -> bool:
@@ -126,7 +123,6 @@ class _Tracks(Beside):
     def _show(self, context: Context) -> None:
         self._go_to(self._frame)
         done, total = len(self._done), len(self._frames) - 1
-        context.window_manager.progress_update(done)
         show_status(rpt_("Tracking: {done} of {total} frames, Esc to stop").format(done=done, total=total))
         redraw(context)
         self._shown = time.perf_counter()
@@ -196,11 +192,7 @@ class SHUTTER_OT_tripod(_Tracks, OfEffect, Operator):
         shutter_edits.tripod(self._target.effect(), bar_edits.auto_key(context))
 
 
-_FRAME = IntProperty(
-    name="Frame",
-    description="Timeline frame; without one, the least confident of the next unsure frames",
-    options={"SKIP_SAVE"},
-)
+_FRAME = given(IntProperty, "Frame", "Timeline frame; without one, the least confident of the next unsure frames")
 
 
 def _look(looking: Operator, effect: PropertyGroup, index: int | None) -> set[str] | None:
