@@ -114,7 +114,7 @@ def smooth_streaks(_self: Operator, _context: Context, effect: PropertyGroup) ->
 
 
 def show_panel(context: Context) -> None:
-    """Open the sidebar's Shutter tab in all previews. In the Properties editor it is below all other panels."""
+    """Open the sidebar's Shutter tab in all previews."""
     for _window, area in preview_areas.previews(context):
         area.spaces.active.show_region_ui = True
     # A sidebar has no tabs before it is drawn. A slow window draws it late; one without room never does.

@@ -7,7 +7,7 @@ import bpy.utils.previews
 import numpy as np
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.types import Context, Menu, PropertyGroup, Scene, Strip, UILayout
+from bpy.types import Context, Menu, Panel, PropertyGroup, Scene, Strip, UILayout
 from bpy.utils.previews import ImagePreviewCollection
 
 from ...core.model import shutters
@@ -15,7 +15,6 @@ from ...core.model.fields import fields_of
 from ...core.pixels import patterns
 from ..data import selection
 from . import drawing
-from .operator_bases import Mixin
 
 Draws = Callable[[UILayout, Scene, PropertyGroup, Strip], None]  # draws the content of a panel
 
@@ -119,26 +118,35 @@ def draw_progress(layout: UILayout, done: int, total: int) -> None:
     layout.progress(factor=done / max(total, 1), text=text, translate=False)
 
 
-def of_effect(label: str, draws: Draws, shows: Callable[[PropertyGroup], Any] | None = None, **look: object) -> type:
-    """Make a panel that shows the effect, closed by default.
+def panel(
+    end: str,
+    label: str,
+    draws: Draws,
+    shows: Callable[[PropertyGroup], Any] | None = None,
+    within: str = "",
+    **look: object,
+) -> type[Panel]:
+    """Make a panel of the Shutter tab that shows the effect, closed by default.
 
     Args:
+        end: of its name. `within` is that of the panel that contains it.
         draws: draws its content.
         shows: returns what the panel shows of an effect; without it the panel is hidden.
         look: other class attributes for Blender.
     """
 
-    class Drawn(Mixin):
-        @classmethod
-        def poll(cls, context: Context) -> bool:
-            active = selection.active(context) if super().poll(context) else None
-            return active is not None and (shows is None or bool(shows(active[1])))
+    def poll(_cls: type[Panel], context: Context) -> bool:
+        active = selection.active(context)
+        return active is not None and (shows is None or bool(shows(active[1])))
 
-        def draw(self, context: Context) -> None:
-            self.layout.use_property_split = True
-            draws(self.layout, *selection.active(context))
+    def draw(self: Panel, context: Context) -> None:
+        self.layout.use_property_split = True
+        draws(self.layout, *selection.active(context))
 
-    return type("Drawn", (Drawn,), {"bl_label": label, "bl_options": {"DEFAULT_CLOSED"}} | look)
+    place = {"bl_space_type": "SEQUENCE_EDITOR", "bl_region_type": "UI", "bl_category": "Shutter"}
+    content = {"bl_label": label, "bl_options": {"DEFAULT_CLOSED"}, "poll": classmethod(poll), "draw": draw}
+    parent = {"bl_parent_id": f"SEQUENCER_PT_shutter{within}"}
+    return type(f"SEQUENCER_PT_shutter{end}", (Panel,), place | content | parent | look)
 
 
 def menu(name: str, label: str) -> Callable[[Callable[[UILayout, Context], None]], type[Menu]]:

@@ -1,4 +1,4 @@
-"""Panels, lists and menus in the Properties editor's Strip tab and in the sequencer's sidebar."""
+"""Panels, lists and menus in the sequencer's sidebar."""
 
 from collections.abc import Iterator
 
@@ -14,7 +14,6 @@ from ..data import annotations, consistency, data_format, selection, strips
 from ..editing import bar_edits, match_source
 from ..rendering import strobing
 from . import bake_operators, region_panels
-from .operator_bases import Mixin
 from .panel_parts import (
     WIDEST,
     draw_fields,
@@ -22,7 +21,7 @@ from .panel_parts import (
     draw_operators,
     draw_properties,
     menu,
-    of_effect,
+    panel,
     pattern_icon,
     sentence,
     too_few_frames,
@@ -98,10 +97,17 @@ def shutter_menu(layout: UILayout, _context: Context) -> None:
     draw_operators(layout, "", "effect_copy", "effect_paste", "recipe_import", "recipe_export")
 
 
-class _Shutters(Mixin):
+class SEQUENCER_PT_shutter(Panel):
     """The first panel. It fits into Blender's default layout without scrolling."""
 
     bl_label = "Shutter"
+    bl_space_type = "SEQUENCE_EDITOR"
+    bl_region_type = "UI"
+    bl_category = "Shutter"
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        return selection.active_strip(context) is not None or selection.active(context) is not None
 
     def draw(self, context: Context) -> None:
         layout = self.layout
@@ -283,53 +289,22 @@ def _draw_options(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip
         sentence(column, iface_("Smooth is off: the nearest source frame is used"), "INFO")
 
 
-class _InProperties:
-    bl_space_type = "PROPERTIES"
-    bl_region_type = "WINDOW"
-    bl_context = "strip"
-
-    @classmethod
-    def poll(cls, context: Context) -> bool:
-        strip = selection.active_strip(context)
-        return strip is not None and (strip.type in strips.SOURCES or selection.active(context) is not None)
-
-
-class _InSidebar:
-    bl_space_type = "SEQUENCE_EDITOR"
-    bl_region_type = "UI"
-    bl_category = "Shutter"
-
-    @classmethod
-    def poll(cls, context: Context) -> bool:
-        return selection.active_strip(context) is not None or selection.active(context) is not None
-
-
-# End of each panel's name: its content, and the panel that contains it.
-_PANELS = {
-    "": (_Shutters, None),
-    "_regions": (of_effect("Regions", region_panels.draw_regions, bl_options=set()), ""),
-    "_transform": (of_effect("Transform", region_panels.draw_transform, selection.active_region), "_regions"),
-    "_track": (
-        of_effect("Track", region_panels.draw_track, region_panels.has_strokes, bl_translation_context=CONTEXT),
+classes = (
+    SEQUENCER_PT_shutter,
+    panel("_regions", "Regions", region_panels.draw_regions, bl_options=set()),
+    panel("_transform", "Transform", region_panels.draw_transform, selection.active_region, "_regions"),
+    panel(
+        "_track",
+        "Track",
+        region_panels.draw_track,
+        region_panels.has_strokes,
         "_regions",
+        bl_translation_context=CONTEXT,
     ),
-    "_follow": (of_effect("Follow Track", region_panels.draw_follow, selection.active_region), "_regions"),
-    "_exposure": (
-        of_effect("", _draw_exposure, selection.active_shutter, bl_options=set(), draw_header=_draw_header),
-        "",
-    ),
-    "_move": (of_effect("Exposure Moves With", _draw_move, selection.active_shutter), "_exposure"),
-    "_camera": (of_effect("Camera", region_panels.draw_camera, region_panels.has_camera), ""),
-    "_options": (of_effect("Options", _draw_options), ""),
-    "_bake": (of_effect("Bake", bake_operators.draw_panel), ""),
-}
-
-
-def _panels(start: str, place: type) -> list[type]:
-    return [
-        type(start + end, (drawn, place, Panel), {} if within is None else {"bl_parent_id": start + within})
-        for end, (drawn, within) in _PANELS.items()
-    ]
-
-
-classes = (*_panels("STRIP_PT_shutter", _InProperties), *_panels("SEQUENCER_PT_shutter", _InSidebar))
+    panel("_follow", "Follow Track", region_panels.draw_follow, selection.active_region, "_regions"),
+    panel("_exposure", "", _draw_exposure, selection.active_shutter, bl_options=set(), draw_header=_draw_header),
+    panel("_move", "Exposure Moves With", _draw_move, selection.active_shutter, "_exposure"),
+    panel("_camera", "Camera", region_panels.draw_camera, region_panels.has_camera),
+    panel("_options", "Options", _draw_options),
+    panel("_bake", "Bake", bake_operators.draw_panel),
+)
