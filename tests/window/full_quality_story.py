@@ -81,8 +81,8 @@ def composed_late():
     then what the engine is asked for."""
     previews, preview, said = sys.modules[driver.PREVIEWS], interface("preview"), []
     name = driver.PREVIEWS
-    drawn, first = preview._draw_notes, previews._SLICE  # on a quick machine nothing would be late
-    preview._draw_notes = lambda region, notes: said.append(notes) or drawn(region, notes)
+    drawn, first = preview.draw_notes, previews._SLICE  # on a quick machine nothing would be late
+    preview.draw_notes = lambda region, notes: said.append(notes) or drawn(region, notes)
     driver.PREVIEWS = ""  # whose pictures it waits for
     for step, frame in (("late_drawn", FRAME + 20), ("late_engine", FRAME + 10)):
         previews._SLICE = 0.0  # nothing is done in time
@@ -103,7 +103,7 @@ def composed_late():
         previews._SLICE = previews.looking.slices.seconds = first  # as it was
         yield from driver.until(lambda: not previews.is_composing(), "the picture comes", 60)
         yield from driver.until(lambda: not late(said), "nothing is late")
-    driver.PREVIEWS, preview._draw_notes = name, drawn  # as they were
+    driver.PREVIEWS, preview.draw_notes = name, drawn  # as they were
     story.edit().frame_set(FRAME)
 
 

@@ -154,7 +154,7 @@ def _draw() -> None:
             previews.refine()
         except effect_source.FAULTS as error:
             say(rpt_("Shutter: {fault}").format(fault=error))
-        _draw_notes(context.region, notes)
+        draw_notes(context.region, notes)
 
 
 def _show(context: Context, shown: Shown, decision: Decision | None, say: Say) -> None:
@@ -276,7 +276,7 @@ def _measure() -> float | None:
 def _show_sharp(context: Context, shown: Shown | None) -> None:
     """Draw notes and strokes over the source frame."""
     with drawing.pixel_space(context.region), suppress(*effect_source.FAULTS):
-        _draw_notes(context.region, [rpt_("Sharp frame to draw on: the result appears after the stroke")])
+        draw_notes(context.region, [rpt_("Sharp frame to draw on: the result appears after the stroke")])
         if shown is not None and not previews.pen_is_down():
             quad = Quad(context.region, shown)
             snapshot = invalidation.current(shown.scene, shown.effect, shown.strip, shown.scene.frame_current)
@@ -349,7 +349,7 @@ def _palette(palette: Colors) -> Texture:
     return Texture(None, (*size, 1), "rgba32f", gpu.types.GPUTexture(size, layers=1, format="RGBA32F", data=data))
 
 
-def _draw_notes(region: Region, notes: list[str]) -> None:
+def draw_notes(region: Region, notes: list[str]) -> None:
     """Draw sentences at the upper left of a region."""
     unit = drawing.ui_scale()
     left, right = 16 * unit, region.width - _NAVIGATION * unit

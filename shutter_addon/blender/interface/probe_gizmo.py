@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import bpy
 import numpy as np
-from bpy.types import Context, Event, Gizmo, GizmoGroup, PropertyGroup, Region, Strip
+from bpy.types import Context, Event, Gizmo, GizmoGroup, PropertyGroup, Region
 
 from ...compute.renderer import Renderer
 from ...compute.request import Request
@@ -72,19 +72,12 @@ def _view(context: Context) -> View | None:
     return seen if annotations.is_invertible(seen.matrix) else None
 
 
-def _is_cropped(strip: Strip, size: tuple[int, int], point: Sequence[float]) -> bool:
-    crop, (x, y) = strip.crop, np.asarray(point) * size
-    return not (crop.min_x <= x < size[0] - crop.max_x and crop.min_y <= y < size[1] - crop.max_y)
-
-
 class SHUTTER_GT_probe(Gizmo):
     """The probe. It follows the pointer and lets clicks through."""
 
     def draw(self, context: Context) -> None:
         shown, at = preview_areas.shown(context), tuple(context.window_manager.virtual_shutter.probe_at)
         if shown is None or (seen := _view(context)) is None:
-            return
-        if _is_cropped(shown.strip, annotations.picture_size(shown.effect), at):
             return
         try:
             render = sessions.of_drawing()
@@ -132,25 +125,21 @@ class SHUTTER_GGT_probe(InPreview, GizmoGroup):
 
 
 class SHUTTER_GT_split(Dragged, Gizmo):
-    def seen(self, context: Context) -> np.ndarray | None:
-        """Return the ends (2, 2) of the split line in pixels of the region."""
-        at = context.window_manager.virtual_shutter.split
-        return None if (seen := _view(context)) is None else seen.on_region([(at, 0.0), (at, 1.0)])
+    seen = staticmethod(_view)
 
-    def show(self, _context: Context, seen: np.ndarray) -> None:
-        x, y = seen.mean(axis=0)
+    def show(self, context: Context, seen: View) -> None:
+        at = context.window_manager.virtual_shutter.split
+        first, (x, y), last = seen.on_region([(at, 0.0), (at, 0.5), (at, 1.0)])
         half = drawing.ui_scale() * _REACH / 2
-        drawing.lines(seen, _MARK, width=2 if self.is_highlight else 1)
+        drawing.lines([first, last], _MARK, width=2 if self.is_highlight else 1)
         drawing.rectangles([(x - half, y - 3 * half, x + half, y + 3 * half)], [_MARK])
 
-    def is_at(self, _context: Context, seen: np.ndarray, location: tuple[int, int]) -> bool:
-        first, second = seen
-        along = (second - first) / max(np.hypot(*(second - first)), 1e-6)
-        offset = np.array(location) - first
-        apart, place = abs(along[0] * offset[1] - along[1] * offset[0]), along @ offset
-        return bool(apart <= drawing.ui_scale() * _REACH and 0 <= place <= np.hypot(*(second - first)))
+    def is_at(self, context: Context, seen: View, location: tuple[int, int]) -> bool:
+        x, y = seen.on_picture(*location)
+        apart = abs(x - context.window_manager.virtual_shutter.split) * np.hypot(*seen.matrix[:2, 0])
+        return bool(apart <= drawing.ui_scale() * _REACH and 0 <= y <= 1)
 
-    def grab(self, context: Context, _event: Event, _seen: np.ndarray) -> None:
+    def grab(self, context: Context, _event: Event, _seen: View) -> None:
         self.before = context.window_manager.virtual_shutter.split
 
     def drag(self, context: Context, event: Event, _tweak: set[str]) -> None:

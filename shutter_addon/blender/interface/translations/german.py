@@ -537,12 +537,6 @@ MESSAGES = {
     ("*", "Rotation"): "Rotation",
     ("*", "Rotation about the region's center"): "Rotation um die Mitte der Region",
     ("Operator", "Transform Region"): "Region transformieren",
-    ("*", "Location X"): "Position X",
-    ("*", "Location Y"): "Position Y",
-    (
-        "*",
-        "Move, rotate and scale the active region by numbers, like its handles in the preview",
-    ): "Die aktive Region durch Zahlen bewegen, drehen und skalieren, wie es ihre Griffe in der Vorschau tun",
     ("*", "Scale"): "Skalieren",
     ("*", "Scale about the region's center"): "Skalierung um die Mitte der Region",
     # Mattes and ramps
@@ -1351,7 +1345,6 @@ MESSAGES = {
     ): "der Strip, der gebacken wurde, ist nicht mehr da; sein Film ist „{path}“",
     # Reports
     ("Operator", "Copy Report"): "Bericht kopieren",
-    ("*", "Report"): "Bericht",
     (
         "*",
         "Copy versions, device, types and numbers of the edit, and last errors: no names, no paths. Nothing is sent",
