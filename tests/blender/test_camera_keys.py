@@ -5,7 +5,7 @@ import math
 import cv2
 import numpy as np
 import pytest
-from support import image_strip, request, write_frames
+from support import call, image_strip, request, write_frames
 
 from shutter_addon.blender.data import annotations, consistency, fcurves, selection, snapshot, strips
 from shutter_addon.blender.editing import add_effect, motion_keys, region_edits, shutter_edits, track_region
@@ -66,11 +66,8 @@ def new_effect(edit, source):
     selection.choose(edit, strip)
     edit.frame_set(16)
     region = region_edits.add_region(effect, effect.shutters[1], "LASSO")
-    stroke = annotations.layer_of(effect, region).frames.new(11).strokes.new()
-    stroke.display_mode = "2DSPACE"
-    stroke.points.add(4)
-    corners = ((-102, 57), (62, 57), (62, -57), (-102, -57))
-    stroke.points.foreach_set("co", [value for x, y in corners for value in (x, y, 0.0)])
+    corners = np.array([(-102, 57), (62, 57), (62, -57), (-102, -57)])
+    annotations.add_stroke(annotations.layer_of(effect, region).frames.new(11), corners)
     for frame in (11, 11 + COUNT):
         region.location = 3 * (frame - 11) / WIDTH, 0
         region.keyframe_insert("location", frame=frame)
@@ -82,11 +79,6 @@ def new_effect(edit, source):
 
 def active(bpy):
     return selection.active(bpy.context)
-
-
-def call(bpy, name, **settings):
-    """Calls an operator as a menu does, with its step of undo."""
-    return getattr(bpy.ops.shutter, name)("EXEC_DEFAULT", True, **settings)
 
 
 def keys(bpy, channel="location"):

@@ -1,7 +1,6 @@
 """What the user can do: every operator works, is one step of undo, and says why it cannot be used where it cannot."""
 
 import json
-import signal
 import wave
 
 import numpy as np
@@ -257,23 +256,6 @@ def test_no_such_file(bpy, effect, tmp_path, name):
     assert "Not a directory" in refusal(bpy, name, filepath=str(tmp_path / "file" / "r.json"))
     assert state(bpy) == before
     assert not path.parent.exists()
-
-
-def test_a_full_disk_leaves_the_old_recipe(bpy, effect, tmp_path):
-    """No file may grow beyond some bytes: a disk without room."""
-    resource = pytest.importorskip("resource")
-    path = tmp_path / "out.json"
-    path.write_text("old")
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    try:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (100, hard))
-        assert f"{path}: File too large" in refusal(bpy, "recipe_export", filepath=str(path))
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-        signal.signal(signal.SIGXFSZ, handler)
-    assert path.read_text() == "old"
-    assert [file.name for file in tmp_path.iterdir() if file.name != "in"] == ["out.json"]
 
 
 # Where nothing can be done

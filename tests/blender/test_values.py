@@ -2,7 +2,6 @@
 
 import inspect
 import math
-import random
 from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -52,10 +51,7 @@ def effect(bpy, edit, tmp_path):
 
 
 def draw(layer, points):
-    drawing = layer.frames[0] if layer.frames else layer.frames.new(1)
-    stroke = drawing.strokes.new()
-    stroke.points.add(len(points))
-    stroke.points.foreach_set("co", [number for x, y in points for number in (x, y, 0)])
+    annotations.add_stroke(layer.frames[0] if layer.frames else layer.frames.new(1), np.array(points))
 
 
 def raw(group, name, value):
@@ -290,57 +286,6 @@ def test_operators_report_it(bpy, edit, effect):
             with pytest.raises(RuntimeError, match='effect "Shutter": Frames is -5'):
                 operator()
     assert len(effect.shutters) == 2
-
-
-@pytest.mark.parametrize("seed", range(10))
-def test_random_values(bpy, edit, effect, seed):
-    """Whatever properties of a good effect become: a picture or a sentence."""
-    rng = random.Random(seed)
-    for _ in range(rng.randint(1, 4)):
-        corrupt(rng, effect)
-        edit.frame_set(rng.randint(1, 12))
-    effect = edit.virtual_shutter.effects[0] if edit.virtual_shutter.effects else None
-    if effect is not None:
-        rendered(effect.scene)
-        exported(edit, effect)
-    show(bpy, edit)
-
-
-def corrupt(rng, effect):
-    """Gives a random property of the effect, or of what belongs to it, a random value, or a random F-curve."""
-    groups = [
-        effect,
-        effect.camera,
-        *effect.shutters,
-        *effect.regions,
-        *effect.shutters[0].bars,
-        *effect.shutters[1].bars,
-    ]
-    natives = [strip_of(effect).transform, strip_of(effect).crop, source_of(effect), strip_of(effect)]
-    group = rng.choice(groups[:1] * 6 + groups + natives * 2)
-    names = [
-        prop.identifier
-        for prop in group.bl_rna.properties
-        if prop.type in {"INT", "FLOAT", "ENUM", "BOOLEAN", "STRING"} and not (prop.is_readonly or prop.is_deprecated)
-    ]
-    name = rng.choice(names)
-    number = rng.choice([NAN, INF, -INF, 0.0, -1.0, 1e9, -1e9, 1e30, 3e9, 77.0, 0.5, 256.0])
-    if group in groups and rng.random() < 0.3:
-        key(group, name, (rng.choice([1, -5, NAN, 3e9, 1e30]), number), (9, rng.choice([NAN, 1e30, 2.0, number])))
-    elif group in groups:
-        prop = group.bl_rna.properties[name]
-        whole = int(number) if abs(number) < 2**31 else rng.choice([-(2**31), 2**31 - 1])
-        value = {"FLOAT": number, "STRING": rng.choice(["", "Face", "x" * 500])}.get(prop.type, whole)
-        with suppress(TypeError):  # a vector takes no number
-            raw(group, name, value)
-    else:
-        with suppress(TypeError, ValueError, OverflowError):  # Blender's own keep to their types
-            setattr(group, name, rng.choice([number, int(min(max(number, -9e8), 9e8)) if number == number else 0]))
-
-
-def rendered(scene):
-    with suppress(effect_source.FAULTS):
-        assert np.isfinite(picture_of(scene, 4)).all()
 
 
 def exported(edit, effect):

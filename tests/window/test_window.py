@@ -166,20 +166,6 @@ def test_one_look_at_full_quality(backend, tmp_path):
     assert min(np.abs(patch - part).max() for part in parts) <= TOLERANCE
 
 
-@pytest.mark.parametrize("backend", backends("opengl"))
-def test_too_few_frames_for_a_streak(backend, tmp_path):
-    """The note has a button that makes it smooth, by which the steps go and the bars stay; undone and redone."""
-    given = {"packages": packages(tmp_path / "packages")}
-    seen, console = tell("strobing_story.py", backend, linked(tmp_path), **given)
-    assert "Traceback" not in console
-    steps = {entry["step"]: entry for entry in seen if "step" in entry}
-    found = {name: (entry["smooth"], entry["bars"], entry["note"] is not None) for name, entry in steps.items()}
-    stepped, smooth = ("1", [8, 8], True), ("AUTO", [8, 8], False)
-    assert found == {"1_steps": stepped, "2_smooth": smooth, "3_undone": stepped, "4_redone": smooth}
-    before, after = (crop(tmp_path, steps[name])[120:280] for name in ("1_steps", "2_smooth"))  # the picture alone
-    assert detail(after) < 0.8 * detail(before)
-
-
 @pytest.mark.parametrize("backend", backends("vulkan"))
 def test_a_rolling_shutter_is_repaired(backend, tmp_path):
     """Found from the menu: the pole stands upright, without a further click. Undone, it leans."""
@@ -231,8 +217,3 @@ def ellipses(picture, unit):
     return [
         (x, y) for x, y in dots if sum(abs(low - y) <= 1 and 0 <= right - x <= 12 * unit for right, low in dots) >= 3
     ]
-
-
-def detail(picture):
-    """How much neighbours along a row differ beyond what a smooth slope does."""
-    return np.abs(np.diff(picture, 2, axis=1)).mean()
