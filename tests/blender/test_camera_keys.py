@@ -5,10 +5,10 @@ import math
 import cv2
 import numpy as np
 import pytest
-from support import call, image_strip, request, write_frames
+from support import call, image_strip, request, started, write_frames
 
 from shutter_addon.blender.data import annotations, consistency, fcurves, selection, snapshot, strips
-from shutter_addon.blender.editing import add_effect, motion_keys, region_edits, shutter_edits, track_region
+from shutter_addon.blender.editing import motion_keys, region_edits, track_region
 from shutter_addon.core.model import motions
 from shutter_addon.core.model.motions import Similarity
 from shutter_addon.media import camera_tracking, registration
@@ -60,10 +60,7 @@ def new_source(edit, first):
 
 
 def new_effect(edit, source):
-    strip, effect = add_effect.add_effect(edit, source)
-    shutter_edits.start(effect)
-    effect.inbetween = "1"
-    selection.choose(edit, strip)
+    _strip, effect = started(edit, source, chosen=True)
     edit.frame_set(16)
     region = region_edits.add_region(effect, effect.shutters[1], "LASSO")
     corners = np.array([(-102, 57), (62, 57), (62, -57), (-102, -57)])
@@ -196,11 +193,8 @@ def flash(edit, folder, black=range(16, 32), count=48):
     """A wall that glides by, a pixel a frame; it is black meanwhile."""
     shots = [np.roll(DARK * 4, 2 * i, axis=1) * np.uint8(i not in black) for i in range(count)]
     source = new_source(edit, write_frames(folder / "black", shots))
-    strip, effect = add_effect.add_effect(edit, source)
-    shutter_edits.start(effect)
-    effect.inbetween = "1"
+    _strip, effect = started(edit, source, chosen=True)
     effect.stop_at_cuts = False
-    selection.choose(edit, strip)
     edit.frame_set(16)
     return effect
 

@@ -4,10 +4,8 @@ import json
 
 import numpy as np
 import pytest
-from support import image_strip, recipe, request, write_frames
+from support import effect_of, image_strip, recipe, request, write_frames
 
-from shutter_addon.blender.data import recipe_import
-from shutter_addon.blender.editing import add_effect
 from shutter_addon.blender.rendering import sessions
 from shutter_addon.core.frames import light
 from shutter_addon.core.recipes import recipe_file
@@ -36,11 +34,9 @@ def edited(bpy, edit, tmp_path):
     def make(*regions, bars=(1,) * WINDOW, **shutter):
         first = write_frames(tmp_path / "in", [frame(i) for i in range(COUNT)])
         source = image_strip(edit, first)
-        strip, effect = add_effect.add_effect(edit, source)
         said = recipe(WINDOW, bars, [1] + [0] * (WINDOW - 1), regions=regions, position="center")
         said["shutters"][0] |= shutter
-        recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(said)))
-        return strip, effect
+        return effect_of(edit, source, said)
 
     yield make
     sessions.forget()

@@ -1,19 +1,14 @@
 """Follow Edges in Blender: keys, retimed strips, drafts, and moments between frames."""
 
-import json
-
 import cv2
 import exact_diffusion
 import numpy as np
 import pytest
-from support import image_strip, picture_of, recipe, request, state, write_frames
+from support import effect_of, image_strip, picture_of, recipe, request, state, write_frames
 
-from shutter_addon.blender.data import recipe_import
-from shutter_addon.blender.editing import add_effect
 from shutter_addon.blender.rendering import invalidation, previews
 from shutter_addon.compute.guide import Guides, guiding
 from shutter_addon.core.model import scribbles
-from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media import open_source
 
 SIZE, COUNT = (96, 54), 9
@@ -40,9 +35,8 @@ def add(bpy, edit):
 
     def added(first, data):
         source = image_strip(edit, first, 1, 1, "film")
-        strip, effect = add_effect.add_effect(edit, source)
         edit.render.resolution_x, edit.render.resolution_y = SIZE
-        recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data)))
+        strip, effect = effect_of(edit, source, data)
         return edit, effect, strip
 
     return added

@@ -1,18 +1,15 @@
 """Outlines in Blender: recipes in and out, trimmed and reversed strips, and the mattes that are kept beside a file."""
 
-import json
-
 import numpy as np
 import pytest
 from OpenImageIO import ImageBuf
-from support import image_strip, recipe, request, write_frames
+from support import effect_of, image_strip, recipe, request, write_frames
 
-from shutter_addon.blender.data import recipe_import, selection, snapshot
-from shutter_addon.blender.editing import add_effect, outline_drawings
+from shutter_addon.blender.data import selection, snapshot
+from shutter_addon.blender.editing import outline_drawings
 from shutter_addon.blender.rendering import outline_carrying, sessions
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import outlines
-from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media.carried_mattes import CarriedFile, CarriedMattes
 
 WIDTH, HEIGHT, COUNT = 96, 64, 12
@@ -53,10 +50,8 @@ def edited(bpy, edit, footage):
     def make(*regions, change=lambda source: None):
         source = image_strip(edit, footage)
         change(source)
-        strip, effect = add_effect.add_effect(edit, source)
         content = recipe(2, [1, 0], [0, 1], regions=regions, **OPTIONS)
-        recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(content)))
-        return strip, effect
+        return effect_of(edit, source, content)
 
     yield make
     sessions.forget()

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from support import call, does, image_strip, request, write_frames
+from support import call, does, image_strip, request, started, write_frames
 
 from shutter_addon.blender.data import annotations, fcurves, selection, snapshot, strips
-from shutter_addon.blender.editing import add_effect, bar_edits, region_edits, shutter_edits, track_region
+from shutter_addon.blender.editing import bar_edits, region_edits, track_region
 from shutter_addon.blender.editing.motion_keys import MotionKeys
 from shutter_addon.core.model.motions import Placement
 
@@ -67,10 +67,7 @@ def new_source(edit, first):
 
 
 def drawn(edit, source, at=None):
-    strip, effect = add_effect.add_effect(edit, source)
-    shutter_edits.start(effect)
-    effect.inbetween = "1"
-    selection.choose(edit, strip)
+    _strip, effect = started(edit, source, chosen=True)
     edit.frame_set(11)
     region = region_edits.add_region(effect, effect.shutters[1], "LASSO")
     middle = (centre(0) if at is None else np.array(at)) - SIZE / 2

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from support import sequencer, write_frames
+from support import sequencer, started, write_frames
 
 from shutter_addon.blender.data import selection
-from shutter_addon.blender.editing import add_effect, reconcile, shown_annotations, shutter_edits, undelete
+from shutter_addon.blender.editing import reconcile, shown_annotations, undelete
 
 pytestmark = pytest.mark.usefixtures("no_exception")
 
@@ -25,9 +25,7 @@ def another(bpy, edit, tmp_path, channel=5, start=1):
     first = write_frames(tmp_path / f"in{channel}", np.zeros((1, 24, 40, 3), dtype=np.uint8))
     source = edit.sequence_editor.strips.new_image("other", str(first), channel, start)
     source.right_handle = start + 40
-    strip, effect = add_effect.add_effect(edit, source)
-    shutter_edits.start(effect)
-    effect.inbetween = "1"
+    strip, _effect = started(edit, source)
     return strip
 
 

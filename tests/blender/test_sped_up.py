@@ -1,16 +1,12 @@
 """Length: Timeline in Blender: footage that is sped up, slowed down, frozen and reversed, beside a camera's."""
 
-import json
-
 import numpy as np
 import pytest
-from support import image_strip, recipe, request, write_frames
+from support import effect_of, image_strip, recipe, request, write_frames
 
-from shutter_addon.blender.data import recipe_import
-from shutter_addon.blender.editing import add_effect, bar_edits
+from shutter_addon.blender.editing import bar_edits
 from shutter_addon.blender.rendering import sessions
 from shutter_addon.core.frames import light
-from shutter_addon.core.recipes import recipe_file
 
 WIDTH, HEIGHT, COUNT, WINDOW = 120, 24, 60, 16
 SPOT, STEP = 6, 1.5  # pixels: its width, and its way from frame to frame
@@ -33,11 +29,9 @@ def edited(bpy, edit, tmp_path):
         first = write_frames(tmp_path / "in", [frame(i) for i in range(COUNT)])
         source = image_strip(edit, first)
         change(source)
-        strip, effect = add_effect.add_effect(edit, source)
         said = recipe(WINDOW, [1] * (WINDOW // 2) + [0] * (WINDOW // 2), **options)
         said["shutters"][0]["length"] = "timeline"
-        recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(said)))
-        return strip, effect
+        return effect_of(edit, source, said)
 
     yield make
     sessions.forget()

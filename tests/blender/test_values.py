@@ -8,11 +8,11 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-from support import image_strip, picture_of, sequencer, state, write_frames
+from support import image_strip, picture_of, sequencer, started, state, write_frames
 
 from shutter_addon import blender
 from shutter_addon.blender.data import annotations, fcurves, preview_areas, selection, snapshot
-from shutter_addon.blender.editing import add_effect, bar_edits, reconcile, region_edits, shutter_edits
+from shutter_addon.blender.editing import bar_edits, reconcile, region_edits
 from shutter_addon.blender.interface import bar_editor, operators, panels, probe_gizmo, region_gizmo
 from shutter_addon.blender.output import matte_export
 from shutter_addon.blender.rendering import effect_source, invalidation, render_settings, sessions
@@ -31,10 +31,8 @@ def effect(bpy, edit, tmp_path):
     frames = np.random.default_rng(0).integers(0, 256, (12, 24, 40, 3), dtype=np.uint8)
     first = write_frames(tmp_path / "in", frames)
     source = image_strip(edit, first)
-    strip, effect = add_effect.add_effect(edit, source)
+    strip, effect = started(edit, source)
     effect.window = 4
-    shutter_edits.start(effect)
-    effect.inbetween = "1"
     region = region_edits.add_region(effect, effect.shutters[1], name="Face")
     draw(annotations.layer_of(effect, region), [(-9, -9), (9, 0), (3, 8)])
     for frame in (1, 9):
