@@ -1,6 +1,7 @@
 """Parts of panels: sentences, lists, buttons, and the icons of presets and patterns."""
 
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import Any
 
 import bpy.utils.previews
@@ -26,7 +27,6 @@ _MOST_ROWS = 5  # rows of a list without scrolling
 _SIZE, _WINDOW = 32, 8  # pixels of an icon; bars that it shows
 _UNITS = 16  # interface units along each side of an icon
 _LIGHT = (0.8, 0.8, 0.8)
-_icons: list[ImagePreviewCollection] = []  # one item while the extension is registered
 
 
 def sentence(layout: UILayout, words: str, icon: str = "NONE", room: float = 1.0, is_quiet: bool = False) -> None:
@@ -162,9 +162,22 @@ def menu(name: str, label: str) -> Callable[[Callable[[UILayout, Context], None]
     return made
 
 
+@cache
+def _icons() -> ImagePreviewCollection:
+    """Return the icons of presets and patterns."""
+    icons = bpy.utils.previews.new()
+    pictures = {name: _drawn(shutters.preset_bars(name, _WINDOW)) for name in shutters.PRESETS}
+    pictures |= {str(index): _painted(index) for index in range(patterns.COUNT)}
+    for name, picture in pictures.items():
+        icon = icons.new(name)
+        icon.icon_size = icon.image_size = (_SIZE, _SIZE)
+        icon.icon_pixels_float = icon.image_pixels_float = picture.ravel()
+    return icons
+
+
 def icon_of(name: str) -> int:
     """Return the icon of a preset; 0 in the background."""
-    return _icons[0][name].icon_id if _icons and name in _icons[0] else 0
+    return _icons()[name].icon_id
 
 
 def pattern_icon(index: int) -> int:
@@ -190,15 +203,6 @@ def _painted(index: int) -> np.ndarray:
     return picture
 
 
-def register() -> None:
-    _icons.append(bpy.utils.previews.new())
-    pictures = {name: _drawn(shutters.preset_bars(name, _WINDOW)) for name in shutters.PRESETS}
-    pictures |= {str(index): _painted(index) for index in range(patterns.COUNT)}
-    for name, picture in pictures.items():
-        icon = _icons[0].new(name)
-        icon.icon_size = icon.image_size = (_SIZE, _SIZE)
-        icon.icon_pixels_float = icon.image_pixels_float = picture.ravel()
-
-
 def unregister() -> None:
-    bpy.utils.previews.remove(_icons.pop())
+    bpy.utils.previews.remove(_icons())
+    _icons.cache_clear()

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import cache
 
 import bpy
 import gpu
@@ -359,19 +360,21 @@ def draw_notes(region: Region, notes: list[str]) -> None:
 
 
 classes = (ShutterPreview,)
-_handler = None
+
+
+@cache
+def _handler() -> object:
+    # After the sequencer's picture, before annotations and gizmos.
+    return bpy.types.SpaceSequenceEditor.draw_handler_add(_draw, (), "PREVIEW", "POST_VIEW")
 
 
 def register() -> None:
-    global _handler
     bpy.types.WindowManager.virtual_shutter = PointerProperty(type=ShutterPreview)
-    # After the sequencer's picture, before annotations and gizmos.
-    _handler = bpy.types.SpaceSequenceEditor.draw_handler_add(_draw, (), "PREVIEW", "POST_VIEW")
+    _handler()
 
 
 def unregister() -> None:
-    global _handler
-    bpy.types.SpaceSequenceEditor.draw_handler_remove(_handler, "PREVIEW")
-    _handler = None
+    bpy.types.SpaceSequenceEditor.draw_handler_remove(_handler(), "PREVIEW")
+    _handler.cache_clear()
     drawing.free()
     del bpy.types.WindowManager.virtual_shutter
