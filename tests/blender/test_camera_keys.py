@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from support import call, image_strip, request, started, write_frames
 
-from shutter_addon.blender.data import annotations, consistency, fcurves, selection, snapshot, strips
-from shutter_addon.blender.editing import motion_keys, region_edits, track_region
+from shutter_addon.blender.data import annotations, consistency, fcurves, selection, snapshot
+from shutter_addon.blender.editing import region_edits, track_region
 from shutter_addon.core.model import motions
 from shutter_addon.core.model.motions import Similarity
 from shutter_addon.media import camera_tracking, registration
@@ -152,27 +152,6 @@ def test_a_tripod_is_for_the_shutter_that_is_seen(bpy, effect, has_region):
     assert [shutter.follow == "CAMERA" for shutter in effect.shutters] == [index == 0, index == 1]
     assert (effect.active_shutter, effect.position) == (index, "CENTER")
     assert consistency.bars(effect.shutters[index]) == pytest.approx(np.ones(effect.window))
-
-
-def refuses(bpy, name, sentence):
-    before = everything(bpy)
-    with pytest.raises(RuntimeError, match=sentence):
-        call(bpy, name)
-    assert everything(bpy) == before
-
-
-@pytest.mark.parametrize("name", ["track_camera", "tripod"])
-def test_what_cannot_be_tracked_is_said_and_changes_nothing(bpy, edit, effect, tmp_path, name):
-    motion_keys.insert(effect, None)
-    (curve,) = fcurves.curves_under(edit, f"{effect.camera.path_from_id()}.rotation")
-    curve.lock = True
-    refuses(bpy, name, 'camera of effect "Shutter": the F-curve of "Rotation" is locked')
-    curve.lock = False
-    edit.frame_set(5)
-    refuses(bpy, name, "Move the playhead onto the Shutter strip")
-    edit.frame_set(16)
-    strips.source_of(*active(bpy)).directory = "/nowhere/"
-    refuses(bpy, name, "no such file")
 
 
 DARK = texture(WIDTH, HEIGHT) // 4

@@ -295,20 +295,6 @@ def test_only_the_last_effects_that_were_removed_are_kept(edit, add):
     assert all(scene.virtual_shutter.identity == f"identity {number}" for number, scene in kept.items())
 
 
-def test_the_extension_leaves_nothing_kept(bpy, edit, add):
-    scene = add().scene
-    undelete.keep(edit.virtual_shutter.effects[0])
-    update(bpy)
-    annotation, identity = scene.annotation.session_uid, scene.virtual_shutter.identity
-    assert undelete.restore(edit, identity) is not None
-    handlers.unregister()
-    try:
-        assert undelete.restore(edit, identity) is None
-        assert remembering(annotation) == set()
-    finally:
-        handlers.register()
-
-
 def test_an_effect_stays_what_it_is_while_another_edit_gets_a_copy(bpy, edit, add):
     """Undo takes an edit for unchanged that the last step did not change: a new scene in it would be gone then."""
     strip = add()

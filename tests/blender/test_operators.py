@@ -1,7 +1,6 @@
 """What the user can do: every operator works, is one step of undo, and says why it cannot be used where it cannot."""
 
 import json
-import wave
 
 import numpy as np
 import pytest
@@ -285,13 +284,6 @@ def no_sequencer(bpy, edit, effect, tmp_path):
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
 
 
-def sound(bpy, edit, effect, tmp_path):
-    with wave.open(str(tmp_path / "s.wav"), "wb") as file:
-        file.setparams((1, 2, 48000, 4800, "NONE", ""))
-        file.writeframes(bytes(9600))
-    edit.sequence_editor.active_strip = edit.sequence_editor.strips.new_sound("s", str(tmp_path / "s.wav"), 5, 1)
-
-
 def plain(bpy, edit, effect, tmp_path):
     first = edit.sequence_editor.strips[0]
     edit.sequence_editor.active_strip = edit.sequence_editor.strips.new_image("i", first.directory, 5, 1)
@@ -326,7 +318,6 @@ APART = {"source", "effect_copy", "effect_paste", "recipe_import", "recipe_expor
 SITUATIONS = {
     nothing: (SELECT, dict.fromkeys(MAKES_EFFECT, "Select a movie, image or clip strip")),
     no_sequencer: (SELECT, dict.fromkeys(MAKES_EFFECT, "Select a movie, image or clip strip")),
-    sound: (SELECT, dict.fromkeys(MAKES_EFFECT, NO_SOURCE)),
     color: (SELECT, dict.fromkeys(MAKES_EFFECT, NO_SOURCE)),
     plain: (SELECT, dict.fromkeys(MAKES_EFFECT)),
     not_seen: (None, {"add_effect": NO_SOURCE, "draw": UNSEEN, **ALIKE, **REGION_UNSEEN}),

@@ -54,21 +54,6 @@ def test_after_a_cut_the_half_that_is_selected_is_edited_else_that_under_the_pla
     assert active(bpy) == right
 
 
-def test_halves_that_were_moved_apart_have_an_effect_each(bpy, edit, effect):
-    left = strip_of(edit, effect)
-    right = left.split(21, "SOFT")
-    right.content_start += 10
-    reconcile.update()
-    selection.choose(edit, left)
-    edit.frame_set(35)
-    assert selection.active(bpy.context)[1].scene == left.scene != right.scene
-    edit.frame_set(25)
-    assert seen(edit) is None
-    assert selection.in_picture(bpy.context) is None
-    assert active(bpy) == left
-    assert selection.why_unseen(edit, left) == "Move the playhead onto the Shutter strip"
-
-
 def test_of_effects_on_top_of_each_other_the_active_one_is_edited(bpy, edit, effect, tmp_path):
     low, high = strip_of(edit, effect), another(bpy, edit, tmp_path)
     for chosen, expected in ((low, low), (high, high), (source_of(edit, effect), low), (None, high)):

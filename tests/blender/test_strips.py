@@ -8,7 +8,6 @@ from support import (
     effect_of,
     image_strip,
     noise_film,
-    picture_of,
     recipe,
     request,
     sequencer,
@@ -17,7 +16,6 @@ from support import (
 )
 
 from shutter_addon.blender.data import annotations, strips
-from shutter_addon.blender.rendering import effect_source
 from shutter_addon.blender.rendering import job_snapshots as snapshots
 
 LEVELS = 1
@@ -245,20 +243,6 @@ def test_half_resolution(edit, render, effect_on, movie):
     strip, _ = effect_on(new_movie(edit, movie))
     edit.render.resolution_percentage = 50
     check(edit, render, [strip], [1, 20, 40, 60])
-
-
-def test_what_cannot_be_shown_is_said(bpy, edit, effect_on, movie):
-    source = new_movie(edit, movie)
-    _, effect = effect_on(source)
-    effect.shutters[0].bars[0].weight = 0
-    with pytest.raises(effect_source.FAULTS, match='shutter "S0" at frame 5: all bars are zero'):
-        picture_of(effect.scene, 5)
-    effect.shutters.clear()
-    with pytest.raises(effect_source.FAULTS, match='"Shutter" has no shutter'):
-        picture_of(effect.scene, 5)
-    edit.sequence_editor.strips.remove(source)
-    with pytest.raises(effect_source.FAULTS, match='the source strip of "Shutter" was deleted'):
-        picture_of(effect.scene, 5)
 
 
 def test_a_hard_cut_changes_no_picture(bpy, edit, render, tmp_path):

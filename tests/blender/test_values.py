@@ -152,6 +152,7 @@ IMPOSSIBLE = {
         lambda e: [e.shutters.add() for _ in range(MAX_SHUTTERS)],
         f'effect "Shutter": {MAX_SHUTTERS + 2} shutters, but at most {MAX_SHUTTERS} are possible',
     ),
+    "no shutters": (lambda e: e.shutters.clear(), '"Shutter" has no shutter'),
     "points": (
         lambda e: draw(e.scene.annotation.layers[0], [(0, 0)] * 100_001),
         'region "Face": more than 100000 points',
