@@ -291,14 +291,9 @@ def drawing_tool(
     if annotations.layer_of(effect, region, layer) is None:
         region_edits.new_layer(effect, region, layer)
     consistency.aim_pen(effect, layer)
-    _show_annotation(context, effect)
-    return sharp_frame.take_up(context, tool)
-
-
-def _show_annotation(context: Context, effect: PropertyGroup) -> None:
-    """Show the effect's annotation in all previews."""
     for _window, area in preview_areas.previews(context):
         shown_annotations.give(area.spaces.active, effect.scene.annotation)
+    return sharp_frame.take_up(context, tool)
 
 
 @kept

@@ -2,25 +2,27 @@
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 
 import bpy
 import gpu
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, PointerProperty
+from bpy.props import PointerProperty
 from bpy.types import Context, PropertyGroup, Region
 
 from ...compute.renderer import Renderer
 from ...compute.request import Request
 from ...core import stopping
+from ...core.model import fields
 from ...core.model.choices import CONTEXT
 from ...core.model.effect import SubjectRegion
 from ...core.model.frame_state import FrameState
 from ...devices.device import Texture
 from ..data import annotations, preview_areas, selection
 from ..data.preview_areas import Shown
+from ..data.properties import with_fields
 from ..data.snapshot import Snapshot
 from ..devices import blender_gpu, main_thread
 from ..editing import shown_annotations
@@ -67,6 +69,7 @@ def _redraw_when_still() -> float | None:
     return None
 
 
+_CHOSEN, _REDRAWN = {"update": _view_chosen}, {"update": preview_areas.redraw}
 _HOLES = (1.0, 0.55, 0.0), (0.75, 0.2, 0.9)  # colors of compute.plates.TAKEN and FILLED
 Colors = Sequence[Sequence[float]]  # display values
 Say = Callable[[str], None]  # adds a note
@@ -76,43 +79,29 @@ _STILL = 0.4  # seconds after which a frame counts as still
 _SOON = 0.1  # seconds
 
 
+@dataclass
+class _Settings:
+    live: bool = fields.switch("Live", "Show strokes and views of the effect in the preview", default=True)
+    view: str = fields.choice("View", "What the live preview shows", VIEWS, default="result", context=CONTEXT)
+    split: float = fields.fixed(
+        "Split Position",
+        "Border between source and result, as a fraction of the picture's width",
+        default=0.5,
+        subtype="FACTOR",
+    )
+    probe: bool = fields.switch("Probe", "Show the bars of the pixel under the pointer, and its share of each shutter")
+    probe_at: tuple[float, float] = fields.fixed(
+        "Probe Position",
+        "Position of the probe, as fractions of the picture from its lower left corner",
+        default=(-1.0, -1.0),
+        least=-1e3,
+        most=1e3,
+    )
+
+
+@with_fields(_Settings, live=_CHOSEN, view=_CHOSEN, split=_REDRAWN, probe=_REDRAWN, probe_at=_REDRAWN)
 class ShutterPreview(PropertyGroup):
     """Settings of the live preview, in the window manager: not saved, without undo."""
-
-    live: BoolProperty(
-        name="Live",
-        description="Show strokes and views of the effect in the preview",
-        default=True,
-        update=_view_chosen,
-    )
-    view: EnumProperty(
-        name="View",
-        description="What the live preview shows",
-        items=VIEWS,
-        update=_view_chosen,
-        translation_context=CONTEXT,
-    )
-    split: FloatProperty(
-        name="Split Position",
-        description="Border between source and result, as a fraction of the picture's width",
-        subtype="FACTOR",
-        default=0.5,
-        min=0.0,
-        max=1.0,
-        update=preview_areas.redraw,
-    )
-    probe: BoolProperty(
-        name="Probe",
-        description="Show the bars of the pixel under the pointer, and its share of each shutter",
-        update=preview_areas.redraw,
-    )
-    probe_at: FloatVectorProperty(
-        name="Probe Position",
-        description="Position of the probe, as fractions of the picture from its lower left corner",
-        size=2,
-        default=(-1.0, -1.0),
-        update=preview_areas.redraw,
-    )
 
 
 def _draw() -> None:

@@ -78,15 +78,6 @@ def place(context: Context) -> Place | None:
     return Place(centre, corner, seen_as)
 
 
-def outline(context: Context, where: Place) -> list[np.ndarray]:
-    """Return the active region's strokes (n, 2) by its properties, keyed or not, in pixels of the preview's region."""
-    scene, effect, strip = selection.active(context)
-    region = selection.active_region(effect)
-    numbers = region.location, np.degrees(region.rotation), region.scale
-    moved = scribbles.transform(_strokes_now(scene, effect, strip), *numbers, where.view.aspect)
-    return [where.view.on_region(points) for points in moved]
-
-
 class SHUTTER_GT_region(Dragged, Gizmo):
     """A handle of the active region: it moves the region, or, if `turns`, rotates and scales it."""
 
@@ -94,8 +85,12 @@ class SHUTTER_GT_region(Dragged, Gizmo):
 
     def show(self, context: Context, seen: Place) -> None:
         if self.is_modal:  # else the draw handler shows the keyed place
-            for points in outline(context, seen):
-                drawing.lines(points, _MARK, width=2)
+            scene, effect, strip = selection.active(context)
+            region = selection.active_region(effect)
+            numbers = region.location, np.degrees(region.rotation), region.scale
+            strokes = _strokes_now(scene, effect, strip)
+            for points in scribbles.transform(strokes, *numbers, seen.view.aspect):
+                drawing.lines(seen.view.on_region(points), _MARK, width=2)
         if not self.turns:
             drawing.lines([seen.centre, seen.corner], (1, 1, 1, 0.4))
         x, y = seen.corner if self.turns else seen.centre
