@@ -24,20 +24,14 @@ def redraw(context: Context) -> None:
     """Redraw editors that show the effect. Blender does not know that its data changed."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:
-            if area.type in {"SEQUENCE_EDITOR", "PROPERTIES", "DOPESHEET_EDITOR", "GRAPH_EDITOR"}:
+            if area.type in {"SEQUENCE_EDITOR", "DOPESHEET_EDITOR", "GRAPH_EDITOR"}:
                 area.tag_redraw()
 
 
-def report_error(operator: Operator, sentence: str) -> None:
-    """Report a translated sentence as an error, and keep it for *Copy Report* without its names."""
+def report(operator: Operator, sentence: str, kind: str = "WARNING") -> None:
+    """Report a translated sentence as a warning or error, and keep it for *Copy Report* without its names."""
     told.record(level=2)
-    operator.report({"ERROR"}, sentence)
-
-
-def report_warning(operator: Operator, sentence: str) -> None:
-    """Report a translated sentence as a warning, like `report_error`."""
-    told.record(level=2)
-    operator.report({"WARNING"}, sentence)
+    operator.report({kind}, sentence)
 
 
 def popup(context: Context, words: str, **looks: str) -> None:
@@ -97,7 +91,7 @@ class Named(Mixin):
         try:
             return step(*arguments) or {"FINISHED"}
         except (*FAULTS, UserError) as error:
-            report_error(self, str(error))
+            report(self, str(error), "ERROR")
             return {"CANCELLED"}
 
 

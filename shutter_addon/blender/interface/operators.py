@@ -33,8 +33,7 @@ from .operator_bases import (
     kept,
     operator,
     redraw,
-    report_error,
-    report_warning,
+    report,
 )
 from .panel_parts import draw_properties, icon_of
 
@@ -100,7 +99,7 @@ def match_source(self: Operator, _context: Context, effect: PropertyGroup) -> No
     """Copy transform, crop, flip, color and range of the source to the Shutter strip (strokes stay on the picture)"""
     if (neighbor := matching.match(effect)) is not None:
         sentence = rpt_('"{neighbor}" is in the way: "{strip}" does not have the whole range of its source')
-        report_warning(self, sentence.format(neighbor=neighbor.name, strip=self.effect_strip.name))
+        report(self, sentence.format(neighbor=neighbor.name, strip=self.effect_strip.name))
 
 
 def _why_smooth(effect: PropertyGroup) -> str | None:
@@ -200,7 +199,7 @@ def bars_key(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
 def bars_unkey(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
     """Delete the keyframes of all bars of the active shutter at the current frame"""
     if not bar_edits.unkey_bars(effect, effect.active_shutter):
-        report_warning(self, rpt_("No bar has a keyframe at the current frame"))
+        report(self, rpt_("No bar has a keyframe at the current frame"))
         return {"CANCELLED"}
     return None
 
@@ -342,7 +341,7 @@ def effect_copy(self: Operator, _context: Context, effect: PropertyGroup) -> Non
     """Copy the shutters, regions, keyframes and options of the effect, for other strips and scenes of this file"""
     undelete.copy(effect, self.effect_strip)
     if data_format.is_newer(self.edit):
-        report_warning(self, rpt_("Copied without data of a newer version of Virtual Shutter"))
+        report(self, rpt_("Copied without data of a newer version of Virtual Shutter"))
 
 
 class SHUTTER_OT_effect_paste(MakesEffect, OfEffect, Operator):
@@ -372,7 +371,7 @@ class SHUTTER_OT_recipe_import(OfEffect, ImportHelper, Operator):
         found = recipe_file.load(path)
         recipe_import.apply(self.edit, effect, self.effect_strip, found, path.parent)
         if found.lost is not None:
-            report_warning(self, rpt_(found.lost.template).format(**found.lost.words))
+            report(self, rpt_(found.lost.template).format(**found.lost.words))
 
 
 class SHUTTER_OT_recipe_export(OfEffect, ExportHelper, Operator):
@@ -392,7 +391,7 @@ class SHUTTER_OT_recipe_export(OfEffect, ExportHelper, Operator):
             raise UserError(f"{path}: {error.strerror or error}") from None
         if data_format.is_newer(self.edit):
             words = rpt_('Saved "{path}" without data of a newer version of Virtual Shutter')
-            report_warning(self, words.format(path=path))
+            report(self, words.format(path=path))
         else:
             self.report({"INFO"}, rpt_('Saved "{path}"').format(path=path))
 
@@ -405,7 +404,7 @@ class SHUTTER_OT_copy_report(Named, Operator):
 
     def execute(self, context: Context) -> set[str]:
         if bpy.app.background:
-            report_error(self, rpt_("Without a window there is no clipboard: use the command check with --report"))
+            report(self, rpt_("Without a window there is no clipboard: use the command check with --report"), "ERROR")
             return {"CANCELLED"}
         context.window_manager.clipboard = error_report.text(selection.scene_of(context))
         self.report({"INFO"}, rpt_("Report copied: paste it into your message and read it before you send it"))

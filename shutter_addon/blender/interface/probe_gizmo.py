@@ -108,11 +108,10 @@ def _draw(
     drawing.lines([(x, y - arm), (x, y + arm)], _MARK, width=1)
     drawing.rectangles([frame], [drawing.BACK])
     drawing.bars(bars, mixed / max(1.0, mixed.max()), (*(shares @ colors), 0.95))
-    left, _, right, _ = bars
+    left = bars[0]
     for i, (bottom, shutter, share) in enumerate(zip(lines, shutters, shares, strict=True)):
         drawing.swatch(left, bottom - unit, 12 * unit, shutter, i)
-        drawing.text(left + 18 * unit, bottom, shutter.name, until=right - 44 * unit)
-        drawing.text(right - 38 * unit, bottom, f"{share:.1%}")
+        drawing.text(left + 18 * unit, bottom, f"{share:.1%}  {shutter.name}")
 
 
 class SHUTTER_GGT_probe(InPreview, GizmoGroup):

@@ -12,7 +12,7 @@ from ..data import selection, validation
 from ..editing import bar_edits, follow_track, outline_drawings, shutter_edits, track_region
 from ..rendering.effect_source import FAULTS
 from . import needs
-from .operator_bases import Beside, OfEffect, given, operator, redraw, report_warning, show_status
+from .operator_bases import Beside, OfEffect, given, operator, redraw, report, show_status
 
 # Seconds: work between two redraws, at least and at most; waiting for the tracking thread.
 _TICK, _MOST, _PATIENCE = 0.05, 0.1, 0.02
@@ -113,7 +113,7 @@ class _Tracks(Beside):
         except FAULTS as error:
             if not self._done:
                 raise
-            report_warning(self, str(error))
+            report(self, str(error))
         return False
 
     def _go_to(self, frame: int) -> None:
@@ -135,13 +135,13 @@ class _Tracks(Beside):
         self.report({"INFO"}, sentence.format(first=first, last=last))
         lost = track_region.lost(effect, self._target.index)
         if lost and lost[0] in self._frames:
-            report_warning(self, lost[1])
+            report(self, lost[1])
             return
         for frame, fault, is_fault in track_region.stops(effect, self._target.index):
             if frame in self._frames:
                 words = rpt_("Tracking stopped at frame {frame}: {fault}").format(frame=frame, fault=fault)
                 if is_fault:
-                    report_warning(self, words)
+                    report(self, words)
                 else:
                     self.report({"INFO"}, words)
 
