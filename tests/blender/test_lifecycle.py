@@ -97,17 +97,6 @@ def test_a_source_that_was_muted_shows_again(bpy, edit, add):
     assert source.mute
 
 
-def test_a_deleted_edit_takes_its_effects_along(bpy, edit, add):
-    add()
-    other = bpy.data.scenes.new("Other")
-    bpy.context.window.scene = other
-    bpy.data.scenes.remove(edit)
-    update(bpy)
-    assert [scene.name for scene in bpy.data.scenes] == ["Other"]
-    assert not bpy.data.cameras
-    assert not bpy.data.annotations
-
-
 @pytest.mark.parametrize("late", [True, False])
 def test_undo_brings_an_effect_back_and_redo_removes_it_again(bpy, edit, add, render, late):
     """late: in a window, the handler comes after the undo push."""
