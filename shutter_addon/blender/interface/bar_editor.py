@@ -104,12 +104,6 @@ def _seen(context: Context) -> tuple[Scene, PropertyGroup, Strip, np.ndarray, li
         return None
 
 
-def _key_colors() -> dict:
-    """Return the theme's colors of keyed fields."""
-    theme = bpy.context.preferences.themes[0].user_interface.wcol_state
-    return {"animated": theme.inner_anim, "keyed": theme.inner_key, "changed": theme.inner_changed}
-
-
 class SHUTTER_GT_bars(Dragged, Gizmo):
     seen = staticmethod(_seen)
 
@@ -172,7 +166,8 @@ def _draw(place: Layout, shutter: PropertyGroup, values: np.ndarray, states: lis
     left, bottom, right, _top = place.box
     edges = np.linspace(left, right, place.count + 1)
     thin, foot = drawing.line_width(), drawing.ui_scale() * 3
-    colors = _key_colors()
+    theme = bpy.context.preferences.themes[0].user_interface.wcol_state
+    colors = {"animated": theme.inner_anim, "keyed": theme.inner_key, "changed": theme.inner_changed}
     drawing.rectangles([place.frame], [drawing.BACK])
     boxes = drawing.bars(place.box, np.minimum(values / place.top, 1.0), (*shutter.color, 0.95))
     keyed = [i for i, state in enumerate(states) if state]

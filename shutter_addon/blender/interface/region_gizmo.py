@@ -156,12 +156,6 @@ class SHUTTER_GT_region(Dragged, Gizmo):
         bpy.ops.ed.undo_push(message=iface_("Transform Region", contexts.operator_default))
 
 
-def _is_drawing(context: Context) -> bool:
-    """Return whether the preview's tool draws or erases strokes."""
-    tool = context.workspace.tools.from_space_sequencer(context.space_data.view_type)
-    return tool is not None and tool.idname.startswith("builtin.annotate")
-
-
 class SHUTTER_GGT_region(WithKeys, GizmoGroup):
     bl_label = "Shutter Region"
     shortcuts = (TWEAK, ("shutter.region_key", "I", "PRESS", {}))
@@ -170,7 +164,8 @@ class SHUTTER_GGT_region(WithKeys, GizmoGroup):
     def poll(cls, context: Context) -> bool:
         settings, seen = context.window_manager.virtual_shutter, selection.in_picture(context)
         # A handle would take the pointer from the probe or from the pen.
-        if (settings.live and settings.probe) or _is_drawing(context):
+        tool = context.workspace.tools.from_space_sequencer(context.space_data.view_type)
+        if (settings.live and settings.probe) or (tool is not None and tool.idname.startswith("builtin.annotate")):
             return False
         return seen is not None and seen[0].is_editable and selection.active_region(seen[1]) is not None
 
