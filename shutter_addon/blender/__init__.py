@@ -1,39 +1,19 @@
 """Everything that uses bpy: properties, the engine, strips, commands."""
 
+from functools import cache
 from importlib import import_module
+from pkgutil import iter_modules
 from types import ModuleType
 
 import bpy
 
+from . import interface
+
 # The classes of each are registered (classes_of), then its `register` is called.
-_MODULES = (
-    "devices.main_thread",
-    "interface.translations",
-    "data.preferences",
-    "data.properties",
-    "data.movie_decoding",
-    "rendering.engine",
-    "interface.panel_parts",
-    "interface.sharp_frame",
-    "interface.preview",
-    "interface.operators",
-    "interface.track_operators",
-    "interface.matte_operators",
-    "interface.bake_operators",
-    "interface.full_quality",
-    "interface.panels",
-    "interface.menus",
-    "interface.note_buttons",
-    "interface.gizmo_groups",
-    "interface.bar_editor",
-    "interface.region_gizmo",
-    "interface.outline_operators",
-    "interface.subject_operators",
-    "interface.probe_gizmo",
-    "handlers",
-)
+_DATA = "data.preferences", "data.properties", "data.movie_decoding"
+_INTERFACE = [f"interface.{module.name}" for module in iter_modules(interface.__path__)]
+_MODULES = "devices.main_thread", *_DATA, "rendering.engine", *_INTERFACE, "handlers"
 _modules = [import_module(f".{name}", __package__) for name in _MODULES]
-_commands: list = []
 
 
 def classes_of(module: ModuleType) -> tuple[type, ...]:
@@ -43,6 +23,11 @@ def classes_of(module: ModuleType) -> tuple[type, ...]:
     return (*named, *getattr(module, "classes", ()))
 
 
+@cache
+def _command() -> object:
+    return bpy.utils.register_cli_command("shutter", _run)
+
+
 def register() -> None:
     """Register everything with Blender, with the command."""
     for module in _modules:
@@ -50,12 +35,13 @@ def register() -> None:
             bpy.utils.register_class(cls)
         if hasattr(module, "register"):
             module.register()
-    _commands.append(bpy.utils.register_cli_command("shutter", _run))
+    _command()
 
 
 def unregister() -> None:
     """Unregister everything."""
-    bpy.utils.unregister_cli_command(_commands.pop())
+    bpy.utils.unregister_cli_command(_command())
+    _command.cache_clear()
     for module in reversed(_modules):
         if hasattr(module, "unregister"):
             module.unregister()

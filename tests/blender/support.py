@@ -85,6 +85,19 @@ def effect_of(edit, source, data):
     return strip, effect
 
 
+def started(edit, source, chosen=False):
+    """Puts an effect on a strip as the button makes it, but not smooth; the effect's strip, and the effect."""
+    from shutter_addon.blender.data import selection
+    from shutter_addon.blender.editing import add_effect, shutter_edits
+
+    strip, effect = add_effect.add_effect(edit, source)
+    shutter_edits.start(effect)
+    effect.inbetween = "1"
+    if chosen:
+        selection.choose(edit, strip)
+    return strip, effect
+
+
 def noise_film(edit, frames, folder):
     """Frames (n, H, W, C) as the edit's source, under an effect of two shutters: source, effect and strip."""
     from shutter_addon.blender.rendering import sessions

@@ -1,10 +1,9 @@
-"""Every operator says what it does, is found by Blender's search, and does by numbers and keys what a mouse drags."""
+"""Every operator says what it does, is found by Blender's search; menus have by numbers what a mouse drags."""
 
 from types import SimpleNamespace
 
 import pytest
 
-from shutter_addon.blender.data import fcurves
 from shutter_addon.blender.editing import region_edits
 from shutter_addon.blender.interface import menus
 
@@ -68,19 +67,9 @@ def test_every_operator_is_in_the_menu_of_strips_which_blenders_search_reads(bpy
     assert recorder.menus == [menus.strip_menu.__name__]
 
 
-def test_a_region_is_moved_by_numbers_and_keyed_where_blender_keys_by_itself(bpy, effect, edit):
-    region = region_edits.add_region(effect, effect.shutters[1], "RAMP")
-    values = {"location": (0.25, -0.5), "rotation": 0.5, "scale": 2.0}
-    assert bpy.ops.shutter.region_transform(**values) == {"FINISHED"}
-    assert tuple(region.location) == (0.25, -0.5)
-    assert (region.rotation, region.scale) == (0.5, 2.0)
-    assert not list(fcurves.curves_under(edit, region.path_from_id()))
-    edit.tool_settings.use_keyframe_insert_auto = True
-    bpy.ops.shutter.region_transform(**values)
-    assert len(list(fcurves.curves_under(edit, region.path_from_id()))) == 4
-
-
-def test_the_split_and_the_probe_are_moved_by_numbers_in_the_menu(bpy, effect):
+def test_a_region_the_split_and_the_probe_are_moved_by_numbers_in_the_menus(bpy, effect):
+    region_edits.add_region(effect, effect.shutters[1], "RAMP")
     recorder = Recorder()
-    bpy.types.SHUTTER_MT_of_preview.draw(SimpleNamespace(layout=recorder), bpy.context)
-    assert {"split", "probe", "probe_at"} <= set(recorder.properties)
+    for menu in (bpy.types.SHUTTER_MT_of_region, bpy.types.SHUTTER_MT_of_preview):
+        menu.draw(SimpleNamespace(layout=recorder), bpy.context)
+    assert {"location", "rotation", "scale", "split", "probe", "probe_at"} <= set(recorder.properties)

@@ -76,10 +76,3 @@ def test_a_snapped_stroke_gives_tenths(stroke):
     assert snapped[changed] * 10 == pytest.approx(np.round(snapped[changed] * 10), abs=1e-9)
     assert np.abs(snapped - free).max() <= 0.1 + 1e-9
     assert (snapped >= 0).all()
-
-
-@pytest.mark.parametrize(("combine", "start"), [("LIGHTEST", 54), ("DARKEST", 13), ("MEDIAN", 33.5)])
-def test_bars_that_do_not_average_are_marked(combine, start):
-    boxes = [(0, 10, 8, 60), (8, 10, 16, 11)]  # the second is closed
-    assert bar_editor.marked(boxes, combine, 3) == [(0, start, 8, start + 3)]
-    assert bar_editor.marked(boxes, "AVERAGE", 3) == []

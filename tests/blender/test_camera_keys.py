@@ -5,10 +5,10 @@ import math
 import cv2
 import numpy as np
 import pytest
-from support import image_strip, request, write_frames
+from support import call, image_strip, request, started, write_frames
 
-from shutter_addon.blender.data import annotations, consistency, fcurves, selection, snapshot, strips
-from shutter_addon.blender.editing import add_effect, motion_keys, region_edits, shutter_edits, track_region
+from shutter_addon.blender.data import annotations, consistency, fcurves, selection, snapshot
+from shutter_addon.blender.editing import region_edits, track_region
 from shutter_addon.core.model import motions
 from shutter_addon.core.model.motions import Similarity
 from shutter_addon.media import camera_tracking, registration
@@ -60,17 +60,11 @@ def new_source(edit, first):
 
 
 def new_effect(edit, source):
-    strip, effect = add_effect.add_effect(edit, source)
-    shutter_edits.start(effect)
-    effect.inbetween = "1"
-    selection.choose(edit, strip)
+    _strip, effect = started(edit, source, chosen=True)
     edit.frame_set(16)
     region = region_edits.add_region(effect, effect.shutters[1], "LASSO")
-    stroke = annotations.layer_of(effect, region).frames.new(11).strokes.new()
-    stroke.display_mode = "2DSPACE"
-    stroke.points.add(4)
-    corners = ((-102, 57), (62, 57), (62, -57), (-102, -57))
-    stroke.points.foreach_set("co", [value for x, y in corners for value in (x, y, 0.0)])
+    corners = np.array([(-102, 57), (62, 57), (62, -57), (-102, -57)])
+    annotations.add_stroke(annotations.layer_of(effect, region).frames.new(11), corners)
     for frame in (11, 11 + COUNT):
         region.location = 3 * (frame - 11) / WIDTH, 0
         region.keyframe_insert("location", frame=frame)
@@ -82,11 +76,6 @@ def new_effect(edit, source):
 
 def active(bpy):
     return selection.active(bpy.context)
-
-
-def call(bpy, name, **settings):
-    """Calls an operator as a menu does, with its step of undo."""
-    return getattr(bpy.ops.shutter, name)("EXEC_DEFAULT", True, **settings)
 
 
 def keys(bpy, channel="location"):
@@ -165,27 +154,6 @@ def test_a_tripod_is_for_the_shutter_that_is_seen(bpy, effect, has_region):
     assert consistency.bars(effect.shutters[index]) == pytest.approx(np.ones(effect.window))
 
 
-def refuses(bpy, name, sentence):
-    before = everything(bpy)
-    with pytest.raises(RuntimeError, match=sentence):
-        call(bpy, name)
-    assert everything(bpy) == before
-
-
-@pytest.mark.parametrize("name", ["track_camera", "tripod"])
-def test_what_cannot_be_tracked_is_said_and_changes_nothing(bpy, edit, effect, tmp_path, name):
-    motion_keys.insert(effect, None)
-    (curve,) = fcurves.curves_under(edit, f"{effect.camera.path_from_id()}.rotation")
-    curve.lock = True
-    refuses(bpy, name, 'camera of effect "Shutter": the F-curve of "Rotation" is locked')
-    curve.lock = False
-    edit.frame_set(5)
-    refuses(bpy, name, "Move the playhead onto the Shutter strip")
-    edit.frame_set(16)
-    strips.source_of(*active(bpy)).directory = "/nowhere/"
-    refuses(bpy, name, "no such file")
-
-
 DARK = texture(WIDTH, HEIGHT) // 4
 
 
@@ -204,11 +172,8 @@ def flash(edit, folder, black=range(16, 32), count=48):
     """A wall that glides by, a pixel a frame; it is black meanwhile."""
     shots = [np.roll(DARK * 4, 2 * i, axis=1) * np.uint8(i not in black) for i in range(count)]
     source = new_source(edit, write_frames(folder / "black", shots))
-    strip, effect = add_effect.add_effect(edit, source)
-    shutter_edits.start(effect)
-    effect.inbetween = "1"
+    _strip, effect = started(edit, source, chosen=True)
     effect.stop_at_cuts = False
-    selection.choose(edit, strip)
     edit.frame_set(16)
     return effect
 
@@ -219,7 +184,6 @@ def test_where_the_cameras_motion_is_unknown_exposures_become_short(bpy, edit, t
     effect = flash(edit, tmp_path)
     call(bpy, "tripod")
     assert track_region.stops(effect, None) == [(27, camera_tracking.BARE, True)]
-    assert [(gap.first, gap.last) for gap in track_region.gaps(effect, None)] == [(27, 42)]
     state = {frame: request(*active(bpy), frame).state for frame in range(11, 59)}
     spans = {frame: np.flatnonzero(found.bars[0] > 1e-6) - found.options.before for frame, found in state.items()}
     for frame, span in spans.items():

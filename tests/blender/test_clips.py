@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from support import effect_of, picture_of, recipe, sequencer, write_frames, write_movie
+from support import effect_of, picture_of, recipe, sequencer, started, write_frames, write_movie
 
-from shutter_addon.blender.editing import add_effect, shutter_edits
 from shutter_addon.blender.rendering import effect_source
 
 RNG = np.random.default_rng(0)
@@ -88,9 +87,7 @@ def test_colour_spaces(edit, render, tmp_path, clip_strip, movie, space):
 
 def test_what_is_not_supported_is_said(edit, clip_strip, movie):
     source = clip_strip(movie)
-    strip, effect = add_effect.add_effect(edit, source)
-    shutter_edits.start(effect)
-    effect.inbetween = "1"
+    strip, _effect = started(edit, source)
     picture_of(strip.scene, 1)
     source.stabilize2d = True
     with pytest.raises(effect_source.FAULTS, match='"clip": undistorted or stabilized clips are not supported'):

@@ -278,16 +278,6 @@ def test_an_original_stays_what_it_is_whatever_it_is_called(bpy, edit, add, name
     assert all(e.scene.annotation.virtual_shutter_made == e.identity for e in effects)
 
 
-def test_an_effect_whose_scene_somebody_removed_leaves_nothing(bpy, edit, add):
-    """And a strip that still shows nothing stays as it is."""
-    strip = add()
-    bpy.data.scenes.remove(strip.scene)
-    for _ in range(2):
-        bpy.context.view_layer.update()
-        assert strip.scene is None
-        assert (len(edit.virtual_shutter.effects), len(bpy.data.annotations), len(bpy.data.cameras)) == (0, 0, 0)
-
-
 def test_an_effect_scene_whose_sequencer_shows_itself(bpy, edit, add):
     """Blender lets nobody change what such a strip shows."""
     effect_scene = add().scene

@@ -6,9 +6,8 @@ import tempfile
 import numpy as np
 import OpenImageIO
 import pytest
-from support import EXTENSION, noise_film
+from support import EXTENSION, noise_film, started
 
-from shutter_addon.blender.editing import add_effect, shutter_edits
 from shutter_addon.blender.output import edit_feed
 from shutter_addon.blender.output.edit_feed import LevelsFile
 from shutter_addon.blender.rendering import render_job
@@ -166,9 +165,7 @@ def two_effects(edit, source, strip, folder):
     other = edit.sequence_editor.strips.new_image("second", str(folder / "in" / "f0005.png"), 1, 5)
     other.right_handle = COUNT + 1
     other.elements.append("f0006.png")
-    second, effect = add_effect.add_effect(edit, other)
-    shutter_edits.start(effect)
-    effect.inbetween = "1"
+    second, effect = started(edit, other)
     effect.edges = "SHORTEN"  # an exposure longer than its clip would slide to one place
     second.right_handle = COUNT + 1
 

@@ -353,4 +353,4 @@ def test_a_new_effect_is_as_smooth_as_its_footage_needs(edit, effect, monkeypatc
     new = add_effect.add_effect(edit, edit.sequence_editor.strips["images"])[1]
     assert new.inbetween == "1"
     shutter_edits.start(new)
-    assert new.inbetween == smooth
+    assert (new.inbetween, new.edges, new.border) == (smooth, "SLIDE", True)

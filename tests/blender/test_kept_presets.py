@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from shutter_addon.blender.data import consistency, recipe_import, strips
-from shutter_addon.blender.editing import bar_edits, region_edits, shutter_edits
+from shutter_addon.blender.editing import bar_edits, shutter_edits
 from shutter_addon.core.model import shutters
 
 WINDOWS = 1, 2, 8, 32, 256
@@ -40,17 +40,6 @@ def test_it_is_what_the_preset_makes_however_it_came_there(effect, name, positio
         effect.window = window
         assert bars(effect) == made(name, effect)
         assert consistency.preset_of(effect, 1) == name
-
-
-def test_still_frame_after_sharp_subject_opens_the_shown_one(bpy, effect):
-    region_edits.add_region(effect, effect.shutters[1])
-    shutter_edits.as_layer(effect, 0, "STILL", "ANGLE_360")
-    assert opened(effect) == [3]
-    effect.active_shutter = 1
-    assert bpy.ops.shutter.preset("EXEC_DEFAULT", True, preset="STILL") == {"FINISHED"}
-    assert opened(effect) == [3]
-    effect.window = 24
-    assert opened(effect) == [11]
 
 
 def by_hand(effect):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support import call, request, write_frames
+from support import call, write_frames
 from test_region_tracking import SIZE, active, centre, drawn, new_source, picture
 
 from shutter_addon.blender.editing import region_edits, shutter_edits
@@ -58,20 +58,6 @@ def test_another_region_keeps_its_shutter(bpy, region):
     call(bpy, "clean_trail")
     assert [each.shutter for each in effect.regions] == ["Subject", "Sharp"]
     assert bars(effect)["Sharp"] == STILL, "the frames lie around the shown one now, which it goes on to show"
-
-
-def test_a_layer_is_rendered(bpy, edit, region):
-    """The state has it, in all frames around; without the switch it has none. Of a smooth effect, still is a frame."""
-    active(bpy)[1].inbetween = "2"
-    call(bpy, "sharp_subject")
-    assert bars(active(bpy)[1])["Sharp"] == STILL
-    active(bpy)[1].inbetween = "1"
-    edit.frame_set(20)
-    layers = request(*active(bpy), 20).state.layers
-    assert layers.shutters == (1,)
-    assert {len(state.shapes) for state in layers.scribbles} == {1}
-    active(bpy)[1].regions[0].is_layer = False
-    assert request(*active(bpy), 20).state.layers is None
 
 
 def test_the_subject_has_the_same_pixels_with_more_frames(bpy, edit, region, render):

@@ -97,17 +97,6 @@ def test_a_source_that_was_muted_shows_again(bpy, edit, add):
     assert source.mute
 
 
-def test_a_deleted_edit_takes_its_effects_along(bpy, edit, add):
-    add()
-    other = bpy.data.scenes.new("Other")
-    bpy.context.window.scene = other
-    bpy.data.scenes.remove(edit)
-    update(bpy)
-    assert [scene.name for scene in bpy.data.scenes] == ["Other"]
-    assert not bpy.data.cameras
-    assert not bpy.data.annotations
-
-
 @pytest.mark.parametrize("late", [True, False])
 def test_undo_brings_an_effect_back_and_redo_removes_it_again(bpy, edit, add, render, late):
     """late: in a window, the handler comes after the undo push."""
@@ -293,20 +282,6 @@ def test_only_the_last_effects_that_were_removed_are_kept(edit, add):
     kept = {number: scene for number, scene in found.items() if scene is not None}
     assert list(kept) == [0, *range(64, 127)]
     assert all(scene.virtual_shutter.identity == f"identity {number}" for number, scene in kept.items())
-
-
-def test_the_extension_leaves_nothing_kept(bpy, edit, add):
-    scene = add().scene
-    undelete.keep(edit.virtual_shutter.effects[0])
-    update(bpy)
-    annotation, identity = scene.annotation.session_uid, scene.virtual_shutter.identity
-    assert undelete.restore(edit, identity) is not None
-    handlers.unregister()
-    try:
-        assert undelete.restore(edit, identity) is None
-        assert remembering(annotation) == set()
-    finally:
-        handlers.register()
 
 
 def test_an_effect_stays_what_it_is_while_another_edit_gets_a_copy(bpy, edit, add):

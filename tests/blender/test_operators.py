@@ -1,8 +1,6 @@
 """What the user can do: every operator works, is one step of undo, and says why it cannot be used where it cannot."""
 
 import json
-import signal
-import wave
 
 import numpy as np
 import pytest
@@ -259,23 +257,6 @@ def test_no_such_file(bpy, effect, tmp_path, name):
     assert not path.parent.exists()
 
 
-def test_a_full_disk_leaves_the_old_recipe(bpy, effect, tmp_path):
-    """No file may grow beyond some bytes: a disk without room."""
-    resource = pytest.importorskip("resource")
-    path = tmp_path / "out.json"
-    path.write_text("old")
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    try:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (100, hard))
-        assert f"{path}: File too large" in refusal(bpy, "recipe_export", filepath=str(path))
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-        signal.signal(signal.SIGXFSZ, handler)
-    assert path.read_text() == "old"
-    assert [file.name for file in tmp_path.iterdir() if file.name != "in"] == ["out.json"]
-
-
 # Where nothing can be done
 
 NO_SOURCE = "The active strip is not a movie, image or clip strip"
@@ -301,13 +282,6 @@ def not_seen(bpy, edit, effect, tmp_path):
 
 def no_sequencer(bpy, edit, effect, tmp_path):
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-
-
-def sound(bpy, edit, effect, tmp_path):
-    with wave.open(str(tmp_path / "s.wav"), "wb") as file:
-        file.setparams((1, 2, 48000, 4800, "NONE", ""))
-        file.writeframes(bytes(9600))
-    edit.sequence_editor.active_strip = edit.sequence_editor.strips.new_sound("s", str(tmp_path / "s.wav"), 5, 1)
 
 
 def plain(bpy, edit, effect, tmp_path):
@@ -344,7 +318,6 @@ APART = {"source", "effect_copy", "effect_paste", "recipe_import", "recipe_expor
 SITUATIONS = {
     nothing: (SELECT, dict.fromkeys(MAKES_EFFECT, "Select a movie, image or clip strip")),
     no_sequencer: (SELECT, dict.fromkeys(MAKES_EFFECT, "Select a movie, image or clip strip")),
-    sound: (SELECT, dict.fromkeys(MAKES_EFFECT, NO_SOURCE)),
     color: (SELECT, dict.fromkeys(MAKES_EFFECT, NO_SOURCE)),
     plain: (SELECT, dict.fromkeys(MAKES_EFFECT)),
     not_seen: (None, {"add_effect": NO_SOURCE, "draw": UNSEEN, **ALIKE, **REGION_UNSEEN}),

@@ -1,18 +1,15 @@
 """Outlines in Blender: recipes in and out, trimmed and reversed strips, and the mattes that are kept beside a file."""
 
-import json
-
 import numpy as np
 import pytest
 from OpenImageIO import ImageBuf
-from support import image_strip, recipe, request, write_frames
+from support import effect_of, image_strip, recipe, request, write_frames
 
-from shutter_addon.blender.data import recipe_import, selection, snapshot
-from shutter_addon.blender.editing import add_effect, outline_drawings
+from shutter_addon.blender.data import selection, snapshot
+from shutter_addon.blender.editing import outline_drawings
 from shutter_addon.blender.rendering import outline_carrying, sessions
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import outlines
-from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media.carried_mattes import CarriedFile, CarriedMattes
 
 WIDTH, HEIGHT, COUNT = 96, 64, 12
@@ -53,10 +50,8 @@ def edited(bpy, edit, footage):
     def make(*regions, change=lambda source: None):
         source = image_strip(edit, footage)
         change(source)
-        strip, effect = add_effect.add_effect(edit, source)
         content = recipe(2, [1, 0], [0, 1], regions=regions, **OPTIONS)
-        recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(content)))
-        return strip, effect
+        return effect_of(edit, source, content)
 
     yield make
     sessions.forget()
@@ -157,14 +152,14 @@ def test_the_next_drawing_needed(bpy, chosen):
 
 
 def test_one_drawing_says_where_the_next_is_needed(bpy, chosen, monkeypatch):
-    """Where half of the doubt lies on each side, not beside the drawing and not at the farthest frame."""
+    """In the middle of the least confident frames, not beside the drawing."""
     strip, effect = chosen(1)
     assert bpy.ops.shutter.outline_needed() in ({"FINISHED"}, {"CANCELLED"})
     sure = [1.0, 0.9, 0.9, 0.7, 0.7, 0.6, 0.4, 0.2, 0.0, 0.0, 0.0, None]
     monkeypatch.setattr(CarriedMattes, "confidence", lambda _self, number: sure[number])
-    assert outline_drawings.next_needed(strip.id_data, effect, strip, 0) == (9, 0.0)
+    assert outline_drawings.next_needed(strip.id_data, effect, strip, 0) == (11, 0.0)
     sure[6:] = [0.9] * 6
-    assert outline_drawings.next_needed(strip.id_data, effect, strip, 0) == (5, 0.7)
+    assert outline_drawings.next_needed(strip.id_data, effect, strip, 0) == (6, 0.6)
 
 
 def test_what_is_needed_of_straight_ones(bpy, chosen):

@@ -5,7 +5,6 @@ import pytest
 from support import call, request, write_frames
 from test_region_tracking import COUNT, active, centre, drawn, keys, move, new_source, picture
 
-from shutter_addon.blender.data import annotations
 from shutter_addon.blender.editing import region_edits, shutter_edits
 from shutter_addon.blender.rendering import render_settings, sessions
 from shutter_addon.core.frames import light
@@ -30,13 +29,6 @@ def everything(bpy):
     shutters = [(s.name, s.follow, s.follow_region, [bar.weight for bar in s.bars]) for s in effect.shutters]
     names = [(region.name, region.shutter, region.is_layer) for region in effect.regions]
     return shutters, names, effect.position, [keys(bpy, channel) for channel in ("location", "rotation", "confidence")]
-
-
-def refuses(bpy, sentence):
-    before = everything(bpy)
-    with pytest.raises(RuntimeError, match=sentence):
-        call(bpy, "panning_shot")
-    assert everything(bpy) == before
 
 
 def levels_off(bpy, frame):
@@ -112,18 +104,3 @@ def test_other_shutters_keep_their_regions_and_a_name_is_one_regions(bpy, region
     assert [(other.name, other.shutter) for other in effect.regions] == [("Sharp.001", "Sharp"), ("Sharp", "Other")]
     assert effect.shutters[0].follow_region == "Sharp.001"
     assert (effect.active_shutter, effect.active_region) == (1, 0)
-
-
-def test_what_cannot_be_followed_is_said(bpy, edit, region):
-    effect = active(bpy)[1]
-    edit.frame_set(5)
-    refuses(bpy, "Move the playhead onto the Shutter strip")
-    edit.frame_set(11)
-    layer = annotations.layer_of(effect, region)
-    layer.frames.remove(layer.frames[0])
-    refuses(bpy, "the region has no strokes to follow")
-    for frame, index in ((11, 0), (30, 19)):
-        move(bpy, frame, index)
-    refuses(bpy, "the region has no strokes to follow")
-    region_edits.remove_region(effect, 0)
-    refuses(bpy, "The shutter has no region: draw one")

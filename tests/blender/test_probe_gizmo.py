@@ -16,9 +16,9 @@ def gizmo(bpy):
 def test_the_box_lies_in_the_region_and_beside_the_point(gizmo, x, y, count, unit):
     size = 1600, 1000
     point = x * size[0], y * size[1]
-    place = gizmo.layout(point, size, count, unit)
-    left, bottom, right, top = place.frame
-    assert 0 <= left < place.bars[0] < place.bars[2] < right <= size[0]
-    assert 0 <= bottom < place.lines[-1] <= place.lines[0] < place.bars[1] < place.bars[3] < top <= size[1]
-    assert len(place.lines) == count
+    frame, bars, lines = gizmo.layout(point, size, count, unit)
+    left, bottom, right, top = frame
+    assert 0 <= left < bars[0] < bars[2] < right <= size[0]
+    assert 0 <= bottom < lines[-1] <= lines[0] < bars[1] < bars[3] < top <= size[1]
+    assert len(lines) == count
     assert not (left < point[0] < right and bottom < point[1] < top)

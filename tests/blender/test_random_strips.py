@@ -1,17 +1,12 @@
 """A still effect is its source, whatever that is: strips drawn at random. SHUTTER_SEEDS (1,2,3) tries others than CI
 does."""
 
-import json
 import os
 
 import numpy as np
 import pytest
 import random_strips
-from support import recipe
-
-from shutter_addon.blender.data import recipe_import
-from shutter_addon.blender.editing import add_effect
-from shutter_addon.core.recipes import recipe_file
+from support import effect_of, recipe
 
 SEEDS = [int(seed) for seed in os.environ.get("SHUTTER_SEEDS", "1,4,7,18,21,42").split(",")]
 LEVELS = 1
@@ -21,8 +16,7 @@ LEVELS = 1
 def test_still_effects_are_their_sources(bpy, edit, render, tmp_path, seed):
     drawn = random_strips.build(edit, tmp_path / "footage", seed)
     plain = render(edit, drawn.frames)
-    strip, effect = add_effect.add_effect(edit, drawn.strip)
-    recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(recipe(1, [1]))))
+    effect_of(edit, drawn.strip, recipe(1, [1]))
     bpy.context.view_layer.update()
     drawn.strip.mute = True  # or it would be seen a second time at edges that cover half of a pixel
     shown = render(edit, drawn.frames)

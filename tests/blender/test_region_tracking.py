@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from support import call, does, image_strip, request, write_frames
+from support import call, does, image_strip, request, started, write_frames
 
 from shutter_addon.blender.data import annotations, fcurves, selection, snapshot, strips
-from shutter_addon.blender.editing import add_effect, bar_edits, region_edits, shutter_edits, track_region
+from shutter_addon.blender.editing import bar_edits, region_edits, track_region
 from shutter_addon.blender.editing.motion_keys import MotionKeys
 from shutter_addon.core.model.motions import Placement
 
@@ -67,18 +67,12 @@ def new_source(edit, first):
 
 
 def drawn(edit, source, at=None):
-    strip, effect = add_effect.add_effect(edit, source)
-    shutter_edits.start(effect)
-    effect.inbetween = "1"
-    selection.choose(edit, strip)
+    _strip, effect = started(edit, source, chosen=True)
     edit.frame_set(11)
     region = region_edits.add_region(effect, effect.shutters[1], "LASSO")
-    stroke = annotations.layer_of(effect, region).frames.new(11).strokes.new()
-    stroke.display_mode = "2DSPACE"
     middle = (centre(0) if at is None else np.array(at)) - SIZE / 2
-    points = [(middle[0] + x, -middle[1] + y) for x, y in ((-20, -20), (20, -20), (20, 20), (-20, 20))]
-    stroke.points.add(len(points))
-    stroke.points.foreach_set("co", [value for x, y in points for value in (x, y, 0.0)])
+    points = middle * (1, -1) + [(-20, -20), (20, -20), (20, 20), (-20, 20)]
+    annotations.add_stroke(annotations.layer_of(effect, region).frames.new(11), points)
     return region
 
 
@@ -142,12 +136,6 @@ def test_a_region_is_tracked_to_both_ends(bpy, region):
     assert len(keys(bpy, "confidence")[0]) == 20
     assert all(track_region.confidence_at(active(bpy)[1], 0, frame) > 0.5 for frame in range(11, 31))
     assert list(region.stops) == []
-
-
-def test_the_motion_says_what_is_keyed(bpy, region):
-    track(bpy, motion="ROTATION")
-    assert [c for c in ("location", "rotation", "scale") if keys(bpy, c)] == ["location", "rotation"]
-    assert all(any(key[2] == "GENERATED" for key in keys(bpy, channel)[0]) for channel in ("location", "rotation"))
 
 
 def test_a_wrong_frame_is_mended_by_a_key_and_tracking_again(bpy, edit, region):

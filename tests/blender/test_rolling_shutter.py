@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 import support
-from support import image_strip, request, write_frames
+from support import image_strip, request, started, write_frames
 
-from shutter_addon.blender.data import consistency, recipe_import, selection
-from shutter_addon.blender.editing import add_effect, rolling_shutter, shutter_edits
+from shutter_addon.blender.data import consistency, recipe_import
+from shutter_addon.blender.editing import rolling_shutter, shutter_edits
 from shutter_addon.blender.output import matte_export
 from shutter_addon.blender.rendering import sessions
 from shutter_addon.core.model import limits, windows
@@ -34,10 +34,7 @@ def edited(bpy, edit, tmp_path):
     def make(share=0.0, turned=False):
         pictures = [picture.swapaxes(0, 1) if turned else picture for picture in frames(share)]
         source = image_strip(edit, write_frames(tmp_path / "in", pictures))
-        strip, effect = add_effect.add_effect(edit, source)
-        shutter_edits.start(effect)
-        effect.inbetween = "1"
-        selection.choose(edit, strip)
+        strip, effect = started(edit, source, chosen=True)
         edit.frame_set(8)
         return strip, effect
 

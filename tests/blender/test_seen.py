@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from support import sequencer, write_frames
+from support import sequencer, started, write_frames
 
 from shutter_addon.blender.data import selection
-from shutter_addon.blender.editing import add_effect, reconcile, shown_annotations, shutter_edits, undelete
+from shutter_addon.blender.editing import reconcile, shown_annotations, undelete
 
 pytestmark = pytest.mark.usefixtures("no_exception")
 
@@ -25,9 +25,7 @@ def another(bpy, edit, tmp_path, channel=5, start=1):
     first = write_frames(tmp_path / f"in{channel}", np.zeros((1, 24, 40, 3), dtype=np.uint8))
     source = edit.sequence_editor.strips.new_image("other", str(first), channel, start)
     source.right_handle = start + 40
-    strip, effect = add_effect.add_effect(edit, source)
-    shutter_edits.start(effect)
-    effect.inbetween = "1"
+    strip, _effect = started(edit, source)
     return strip
 
 
@@ -54,21 +52,6 @@ def test_after_a_cut_the_half_that_is_selected_is_edited_else_that_under_the_pla
     selection.choose(edit, left)
     left.select = False
     assert active(bpy) == right
-
-
-def test_halves_that_were_moved_apart_have_an_effect_each(bpy, edit, effect):
-    left = strip_of(edit, effect)
-    right = left.split(21, "SOFT")
-    right.content_start += 10
-    reconcile.update()
-    selection.choose(edit, left)
-    edit.frame_set(35)
-    assert selection.active(bpy.context)[1].scene == left.scene != right.scene
-    edit.frame_set(25)
-    assert seen(edit) is None
-    assert selection.in_picture(bpy.context) is None
-    assert active(bpy) == left
-    assert selection.why_unseen(edit, left) == "Move the playhead onto the Shutter strip"
 
 
 def test_of_effects_on_top_of_each_other_the_active_one_is_edited(bpy, edit, effect, tmp_path):

@@ -36,16 +36,3 @@ def test_colours_are_told_apart_and_from_black_grey_and_white_of_footage(bpy, ey
     lab = seen(shutter_edits.COLORS, eyes)
     assert all(closest(lab[[i]], lab[:i]) >= APART for i in range(1, len(lab)))
     assert closest(lab, seen(FOOTAGE, eyes)) >= ON_FOOTAGE
-
-
-def test_new_shutters_have_colours_that_no_other_has(effect):
-    for _ in range(4):
-        shutter_edits.add_shutter(effect)
-    shutter_edits.duplicate_shutter(effect, 1)
-    shutter_edits.remove_shutter(effect, 0)
-    shutter_edits.add_shutter(effect)
-    while len(effect.shutters) < len(shutter_edits.COLORS):
-        shutter_edits.duplicate_shutter(effect, 0)
-    assert len({tuple(shutter.color) for shutter in effect.shutters}) == len(shutter_edits.COLORS)
-    shutter_edits.add_shutter(effect)
-    assert any(np.allclose(effect.shutters[-1].color, color, atol=1e-6) for color in shutter_edits.COLORS)

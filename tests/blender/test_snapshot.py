@@ -4,10 +4,10 @@ import pickle
 
 import numpy as np
 import pytest
-from support import image_strip, request, sequencer, state, write_frames
+from support import image_strip, request, sequencer, started, state, write_frames
 
 from shutter_addon.blender.data import annotations, fcurves, recipe_import, snapshot, source_media, strips
-from shutter_addon.blender.editing import add_effect, bar_edits, region_edits, shutter_edits
+from shutter_addon.blender.editing import bar_edits, region_edits, shutter_edits
 from shutter_addon.blender.rendering import invalidation
 from shutter_addon.core.messages import EffectError
 
@@ -20,10 +20,8 @@ def found(bpy, edit, tmp_path):
     frames = np.random.default_rng(0).integers(0, 256, (24, 24, 40, 3), dtype=np.uint8)
     first = write_frames(tmp_path / "in", frames)
     source = image_strip(edit, first)
-    strip, effect = add_effect.add_effect(edit, source)
+    strip, effect = started(edit, source)
     effect.window = 4
-    shutter_edits.start(effect)
-    effect.inbetween = "1"
     for frame, bars in ((1, [1, 0, 0, 0]), (20, [0, 0, 0, 1])):
         edit.frame_set(frame)
         bar_edits.paint(effect, 1, bars, key=True)

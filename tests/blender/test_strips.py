@@ -8,7 +8,6 @@ from support import (
     effect_of,
     image_strip,
     noise_film,
-    picture_of,
     recipe,
     request,
     sequencer,
@@ -16,11 +15,8 @@ from support import (
     write_movie,
 )
 
-from shutter_addon.blender.data import strips
-from shutter_addon.blender.editing import add_effect, shutter_edits
-from shutter_addon.blender.rendering import effect_source
+from shutter_addon.blender.data import annotations, strips
 from shutter_addon.blender.rendering import job_snapshots as snapshots
-from shutter_addon.core.frames import light
 
 LEVELS = 1
 MOST = 20  # pictures of an effect
@@ -156,14 +152,6 @@ def test_a_freeze_frame(edit, render, effect_on, movie, retime):
     check(edit, render, [strip], range(1, source.right_handle))
 
 
-def test_half_of_a_retimed_strip_that_was_cut_hard(edit, render, effect_on, movie, retime):
-    new_movie(edit, movie)
-    source = new_movie(edit, movie, 81)
-    retime("segment_speed_set", source, speed=150.0)
-    right = source.split(101, "HARD")
-    check(edit, render, [effect_on(strip)[0] for strip in (source, right)], range(81, right.right_handle, 3))
-
-
 @pytest.mark.parametrize("fps", [24, 25, 30])
 def test_a_movie_of_240_fps_that_keeps_its_speed(bpy, edit, render, effect_on, tmp_path, fps):
     """As the Add menu adds it, with "Adjust Playback Rate"."""
@@ -188,75 +176,11 @@ def test_the_window_counts_source_frames_in_playing_order(edit, render, effect_o
     assert [shown[f][0, 0, 0] for f in (1, 10, 19)] == pytest.approx([12 * 17 + 5, 12 * 8 + 5, 5], abs=1)
 
 
-def test_streaks_of_a_new_effect_keep_their_length_up_to_the_clips_ends(edit, render, effect_on, images):
-    """What is sharp stays the shown frame; a recipe that does not say "slide" holds."""
-
-    def mean(*frames):
-        return light.to_encoded(light.to_linear(np.array([12 * f + 5 for f in frames]) / 255).mean()) * 255
-
-    edit.render.resolution_x = edit.render.resolution_y = 32
-    _, effect = add_effect.add_effect(edit, image_strip(edit, images))
-    shutter_edits.start(effect)
-    effect.inbetween = "1"
-    effect.window, effect.position = 5, "CENTER"
-    for index, bars in enumerate(([1] * 5, [0, 0, 1, 0, 0])):
-        for bar, weight in zip(effect.shutters[index].bars, bars, strict=True):
-            bar.weight = weight
-    shown = render(edit, [1, 2, 10, 19, 20])
-    middles = {1: range(5), 2: range(5), 10: range(7, 12), 19: range(15, 20), 20: range(15, 20)}
-    assert {f: picture[0, 0, 0] for f, picture in shown.items()} == pytest.approx(
-        {f: mean(*around) for f, around in middles.items()}, abs=1
-    )
-    effect.shutters.move(1, 0)
-    assert render(edit, [20])[20][0, 0, 0] == pytest.approx(mean(19), abs=1)
-    effect.shutters.move(1, 0)
-    effect.edges = "HOLD"
-    assert render(edit, [20])[20][0, 0, 0] == pytest.approx(mean(17, 18, 19, 19, 19), abs=1)
-
-
 def test_the_window_reaches_past_a_trim(edit, render, effect_on, images):
     source = image_strip(edit, images)
     source.right_handle = 6
     effect_on(source, recipe(8, [0, 0, 0, 0, 0, 0, 0, 1]))
     assert render(edit, [5])[5][0, 0, 0] == pytest.approx(12 * 11 + 5, abs=1)
-
-
-def test_cut_effect_and_source(edit, render, effect_on, movie):
-    source = new_movie(edit, movie)
-    data = recipe(4, {1: [1, 0, 0, 0], 31: [0, 0, 0, 1]})
-    strip, _ = effect_on(source, data)
-    frames = [1, 9, 19, 20, 21, 22, 30, 50]
-    whole = render(edit, frames)
-    parts = [strip, strip.split(20, "SOFT")]
-    parts.append(parts[1].split(30, "HARD"))
-    source.split(22, "SOFT")
-    assert len({part.scene for part in parts}) == 1
-    for frame, picture in render(edit, frames).items():
-        assert np.array_equal(picture, whole[frame]), frame
-
-
-def test_a_duplicate_keeps_the_look_and_gets_data_of_its_own(bpy, edit, render, effect_on, movie):
-    source = new_movie(edit, movie)
-    strip, _ = effect_on(source, recipe(4, {1: [1, 0, 0, 0], 31: [0, 0, 0, 1]}, regions=[]))
-    before = render(edit, [1, 11, 31])
-    for s in edit.sequence_editor.strips:
-        s.select = True
-    # Without a screen, Blender crashes when this operator has no region, and others when they have one.
-    with sequencer(bpy) as area, bpy.context.temp_override(region=area.regions[-1]):
-        bpy.ops.sequencer.duplicate()
-    copy_strip = next(s for s in edit.sequence_editor.strips if s.type == "SCENE" and s != strip)
-    copy_source = next(s for s in edit.sequence_editor.strips if s.type == "MOVIE" and s != source)
-    for s in (copy_strip, copy_source):
-        s.content_start += 100
-    shown = render(edit, [101, 111, 131, 1, 11, 31])
-    assert copy_strip.scene != strip.scene
-    effects = edit.virtual_shutter.effects
-    assert [effect.start for effect in effects] == [1, 101]
-    for frame in (1, 11, 31):
-        assert np.array_equal(shown[frame], before[frame])
-        assert np.array_equal(shown[frame + 100], before[frame])
-    effects[1].shutters[0].name = "Other"
-    assert effects[0].shutters[0].name == "S0"
 
 
 def test_an_effect_moved_with_its_source_takes_its_keys_along(edit, render, effect_on, movie):
@@ -280,11 +204,7 @@ def test_scribbles_lie_where_they_are_seen_on_a_mirrored_strip(bpy, edit, render
     region.shutter, region.kind = "S1", "LASSO"
     layer = effect.scene.annotation.layers.new("corner")
     region.layer = layer.info
-    stroke = layer.frames.new(1).strokes.new()
-    stroke.display_mode = "2DSPACE"
-    corner = [(-12, 4), (-4, 4), (-4, 12), (-12, 12)]
-    stroke.points.add(len(corner))
-    stroke.points.foreach_set("co", [value for x, y in corner for value in (x, y, 0.0)])
+    annotations.add_stroke(layer.frames.new(1), np.array([(-12, 4), (-4, 4), (-4, 12), (-12, 12)]))
     picture = render(edit, [5])[5]
     assert picture[16 - 8, 16 - 8, 0] == 12 * 7 + 5
     assert picture[16 + 8, 16 + 8, 0] < 12 * 6
@@ -323,20 +243,6 @@ def test_half_resolution(edit, render, effect_on, movie):
     strip, _ = effect_on(new_movie(edit, movie))
     edit.render.resolution_percentage = 50
     check(edit, render, [strip], [1, 20, 40, 60])
-
-
-def test_what_cannot_be_shown_is_said(bpy, edit, effect_on, movie):
-    source = new_movie(edit, movie)
-    _, effect = effect_on(source)
-    effect.shutters[0].bars[0].weight = 0
-    with pytest.raises(effect_source.FAULTS, match='shutter "S0" at frame 5: all bars are zero'):
-        picture_of(effect.scene, 5)
-    effect.shutters.clear()
-    with pytest.raises(effect_source.FAULTS, match='"Shutter" has no shutter'):
-        picture_of(effect.scene, 5)
-    edit.sequence_editor.strips.remove(source)
-    with pytest.raises(effect_source.FAULTS, match='the source strip of "Shutter" was deleted'):
-        picture_of(effect.scene, 5)
 
 
 def test_a_hard_cut_changes_no_picture(bpy, edit, render, tmp_path):

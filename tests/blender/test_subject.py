@@ -5,10 +5,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support import image_strip, recipe, request, write_frames
+from support import effect_of, image_strip, recipe, request, write_frames
 
-from shutter_addon.blender.data import annotations, preferences, recipe_import, selection, snapshot
-from shutter_addon.blender.editing import add_effect, outline_drawings
+from shutter_addon.blender.data import annotations, preferences, selection, snapshot
+from shutter_addon.blender.editing import outline_drawings
 from shutter_addon.blender.output import matte_export
 from shutter_addon.blender.rendering import outline_carrying, sessions
 from shutter_addon.core.recipes import recipe_file
@@ -45,9 +45,8 @@ def edited(bpy, edit, footage):
 
     def make(kind="subject", **fields):
         fields = {"name": "o", "shutter": "S1", "kind": kind, "strokes": [STROKE]} | fields
-        strip, effect = add_effect.add_effect(edit, image_strip(edit, footage))
         content = recipe(2, [1, 1], [1, 0], regions=[fields], light="encoded", interpolation="value")
-        recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(content)))
+        strip, effect = effect_of(edit, image_strip(edit, footage), content)
         effect.active_shutter = 1
         selection.choose(edit, strip)
         edit.frame_set(1)

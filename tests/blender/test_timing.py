@@ -5,10 +5,9 @@ import time
 
 import numpy as np
 import pytest
-from support import Like, image_strip, picture_of, write_frames
+from support import Like, image_strip, picture_of, started, write_frames
 
 from shutter_addon.blender.data import source_media, struct_dna
-from shutter_addon.blender.editing import add_effect, shutter_edits
 from shutter_addon.blender.output import edit_check
 from shutter_addon.blender.rendering import pictures
 from shutter_addon.core.frames.retiming import RetimingKey, are_retiming_keys
@@ -42,9 +41,7 @@ def test_what_cannot_be_read_is_shown_at_an_even_speed(bpy, edit, tmp_path, monk
     monkeypatch.setattr(source_media, "record", unknown)
     timing = source_media.timing_of(source)
     assert timing.keys == (known.keys[0], known.keys[-1])
-    strip, effect = add_effect.add_effect(edit, source)
-    shutter_edits.start(effect)
-    effect.inbetween = "1"
+    strip, _effect = started(edit, source)
     for frame in (2, 3):
         picture_of(strip.scene, frame, told.append)
     said = 'strip "images": its retiming keys cannot be read'

@@ -91,8 +91,6 @@ def test_it_fades_where_the_subject_is_covered_and_the_picture_halfway(bpy, edit
     assert shares[first - 11 :] == [0.0] * (LAST + 1 - first)
     assert shares[: first - 15] == [0.75] * (first - 15)
     assert shares[first - 15 : first - 11] == pytest.approx([0.6, 0.45, 0.3, 0.15])
-    (gap,) = track_region.gaps(effect, 0)
-    assert gap.first == first
     fading = request(*active(bpy), first - 2).picture()
     assert not alike(bpy, first - 2, without_region(bpy, first - 2))
     (curve,) = fcurves.curves_under(edit, f"{effect.regions[0].path_from_id()}.opacity")

@@ -11,14 +11,48 @@ sys.path.append(os.environ["SHUTTER_PACKAGES"])
 
 import bpy
 import driver
+import numpy as np
 import story
-import strobing_story
+from support import write_frames
 
 LAST = "bpy.ops.shutter.outline_it()"  # the last row of what edits a region that is drawn
 SHUTTER = 74  # the row with the region's shutter is so much higher, in units of the interface
 NOTES = 52, 45  # the button of the notes, from the right and from above
 # Both languages and both scales are seen, though not each with each: it takes a minute each.
 LAYOUTS = ("en_US", 1.0), ("de_DE", 1.5)
+
+
+COUNT, SIZE, SPEED = 10, (360, 640), 7
+FILM = driver.OUT / "film"  # with too few frames for its exposure
+
+
+def frame(number):
+    """Thin lines over a texture, SPEED pixels further in every frame."""
+    import cv2
+
+    noise = np.random.default_rng(4).integers(0, 256, (48, 96, 3), dtype=np.uint8)
+    texture = cv2.resize(noise, None, fx=8, fy=8, interpolation=cv2.INTER_CUBIC) // 4
+    for line in range(20, texture.shape[1], 70):
+        texture[:, line : line + 3] = 255
+    return texture[: SIZE[0], number * SPEED : number * SPEED + SIZE[1]].copy()
+
+
+def opened():
+    yield from story.opened()
+    first = write_frames(FILM, [frame(number) for number in range(COUNT)])
+    yield from story.pictures_added(first, SIZE)
+    story.edit().frame_set(3)
+    story.effect().inbetween = "1"
+    bpy.ops.ed.undo_push(message="Start")
+    with driver.override("PREVIEW"):
+        bpy.ops.sequencer.view_all_preview()
+    yield 1.0
+
+
+def note():
+    """How far it goes from one frame of the exposure to the next, in pixels."""
+    strobing = sys.modules["bl_ext.user_default.virtual_shutter.shutter_addon.blender.rendering.strobing"]
+    return strobing.last(story.effect())
 
 
 def pointed_at():
@@ -59,7 +93,7 @@ def drawn():
 
 
 def told():
-    yield from strobing_story.opened()
+    yield from opened()
     yield from drawn()
     source = story.edit().sequence_editor.strips_all["Film"]
     source.transform.rotation, source.crop.max_x, source.color_saturation, source.use_flip_x = 0.01, 2, 0.9, True
@@ -71,7 +105,7 @@ def told():
 
 
 def seen(name):
-    yield from driver.until(strobing_story.note, "the note says that there are too few frames", 30)
+    yield from driver.until(note, "the note says that there are too few frames", 30)
     found = yield from buttons()
     sidebar, unit = story.sidebar(), bpy.context.preferences.system.ui_scale
     if LAST in found:

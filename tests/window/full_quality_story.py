@@ -1,5 +1,5 @@
-"""One look at a frame as it will be rendered, by the button at the preview's note: and back by a second click, by
-another frame, by a change. Run inside Blender, by test_window.py."""
+"""One look at a frame as it will be rendered, by *Full Quality*: and back by a second click, by another
+frame, by a change. Run inside Blender, by test_window.py."""
 
 # ruff: noqa: E402 (Blender finds the helpers once it knows their folder)
 import sys
@@ -7,6 +7,7 @@ from pathlib import Path
 
 sys.path[:0] = [str(Path(__file__).parent)]
 
+import bpy
 import driver
 import preview_sizes_story as sizes
 import story
@@ -19,26 +20,10 @@ def interface(name):
     return sys.modules[_part(f"interface.{name}")]
 
 
-def button(operator="shutter.full_quality"):
-    """The middle of a note's button in the preview; None: it has none."""
-    found = interface("note_buttons").places.get((story.preview().as_pointer(), operator))
-    return found and ((found[0][0] + found[0][2]) / 2, (found[0][1] + found[0][3]) / 2)
-
-
-def label(operator):
-    """What a note's button says; None: there is none."""
-    found = interface("note_buttons").places.get((story.preview().as_pointer(), operator))
-    return found and found[1][1]
-
-
 def clicked():
-    yield from driver.until(button, "the button is there")
-    region = story.preview()
-    driver.move(region, *button())
+    with driver.override("PREVIEW"):
+        bpy.ops.shutter.full_quality()
     yield 0.5
-    driver.xdotool("click", 1)
-    yield 0.5
-    driver.move(region, region.width / 2, region.height + 12)
 
 
 def view():
@@ -96,8 +81,8 @@ def composed_late():
     then what the engine is asked for."""
     previews, preview, said = sys.modules[driver.PREVIEWS], interface("preview"), []
     name = driver.PREVIEWS
-    notes, first = preview._Notes, previews._SLICE  # on a quick machine nothing would be late
-    preview._Notes = lambda region: said.append(notes(region)) or said[-1]  # what the screen shows of it is a picture
+    drawn, first = preview.draw_notes, previews._SLICE  # on a quick machine nothing would be late
+    preview.draw_notes = lambda region, notes: said.append(notes) or drawn(region, notes)
     driver.PREVIEWS = ""  # whose pictures it waits for
     for step, frame in (("late_drawn", FRAME + 20), ("late_engine", FRAME + 10)):
         previews._SLICE = 0.0  # nothing is done in time
@@ -118,14 +103,13 @@ def composed_late():
         previews._SLICE = previews.looking.slices.seconds = first  # as it was
         yield from driver.until(lambda: not driver.composing(previews), "the picture comes", 60)
         yield from driver.until(lambda: not late(said), "nothing is late")
-    driver.PREVIEWS, preview._Notes = name, notes  # as they were
+    driver.PREVIEWS, preview.draw_notes = name, drawn  # as they were
     story.edit().frame_set(FRAME)
 
 
 def late(said):
     """Whether what was drawn last is a note that the picture is composed."""
-    # What it will draw, nobody else need know.
-    return bool(said) and any(sentence.startswith("Composing") for sentence, _button in said[-1]._lines)
+    return bool(said) and any(sentence.startswith("Composing") for sentence in said[-1])
 
 
 def told():

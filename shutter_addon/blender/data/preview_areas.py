@@ -63,11 +63,10 @@ def redraw(_owner: object = None, _context: Context | None = None) -> None:
 
 def redraw_panels() -> None:
     """Redraw panels, but no preview."""
-    kinds = {"SEQUENCE_EDITOR": "UI", "PROPERTIES": "WINDOW"}
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
             for region in area.regions:
-                if region.type == kinds.get(area.type):
+                if (area.type, region.type) == ("SEQUENCE_EDITOR", "UI"):
                     region.tag_redraw()
 
 

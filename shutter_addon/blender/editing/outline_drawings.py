@@ -3,7 +3,6 @@
 Annotations have no key types in Blender 5.2, so the Dope Sheet shows generated and hand-made drawings the same way.
 """
 
-from bisect import bisect
 from contextlib import closing
 from functools import lru_cache
 
@@ -144,41 +143,28 @@ def carried_frames(
 
 
 def next_needed(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> tuple[int | None, float]:
-    """Return the frame where another drawing would help a tracked outline most, and its confidence, 0 to 1.
+    """Return the least confident frame of a tracked outline or subject, the middle one of several, and its confidence.
 
-    None: no frame needs one, as all have this confidence.
-
-    Of the stretches between, before and after the drawings, the least confident one counts. The frame halves its doubt.
+    None: no frame needs a drawing, as all have this confidence.
 
     Raises:
         EffectError, MediaError: nothing is tracked.
     """
     file, shown = carried_frames(scene, effect, strip, index)
-    if effect.regions[index].kind == "SUBJECT":
-        return _least_sure(file, shown)
-    drawn = [number for number, _curves in file.drawings]
-    stretches: dict[int, list[tuple[int, int, float]]] = {}
+    is_subject = effect.regions[index].kind == "SUBJECT"
+    drawn = [] if is_subject else [number for number, _curves in file.drawings]
     with closing(file.open()) as mattes:
-        for number, frame in sorted({number: frame for frame, number in shown.items()}.items()):
-            sure = mattes.confidence(number) or 0.0  # None: too far from any drawing
-            if number not in drawn and sure < SURE:
-                stretches.setdefault(bisect(drawn, number), []).append((number, frame, sure))
-    if not stretches:
-        return None, SURE
-    worst = max(stretches.values(), key=lambda stretch: sum(1 - sure for *_, sure in stretch))
-    doubts = np.cumsum([1 - sure for *_, sure in worst])
-    _number, frame, sure = worst[int(np.searchsorted(doubts, doubts[-1] / 2))]
-    return frame, sure
-
-
-def _least_sure(file: CarriedFile | SubjectFile, shown: dict[int, int]) -> tuple[int | None, float]:
-    """The frame of a subject that is least sure of those whose mattes are made."""
-    with closing(file.open()) as mattes:
-        sure = {frame: sure for frame, number in shown.items() if (sure := mattes.confidence(number)) is not None}
-    frame = min(sure, key=sure.__getitem__, default=None)
-    if frame is None or sure[frame] >= SURE_SUBJECT:
-        return None, SURE_SUBJECT
-    return frame, sure[frame]
+        known = {frame: mattes.confidence(number) for frame, number in shown.items() if number not in drawn}
+    if is_subject:  # its mattes may not all be made
+        sure = {frame: share for frame, share in known.items() if share is not None}
+    else:  # too far from any drawing
+        sure = {frame: share or 0.0 for frame, share in known.items()}
+    enough = SURE_SUBJECT if is_subject else SURE
+    least = min(sure.values(), default=enough)
+    if least >= enough:
+        return None, enough
+    worst = sorted(frame for frame, share in sure.items() if share == least)
+    return worst[len(worst) // 2], least
 
 
 def from_mask(scene: Scene, effect: PropertyGroup, strip: Strip, shutter: PropertyGroup, mask: Mask) -> PropertyGroup:

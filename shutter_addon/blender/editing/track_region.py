@@ -176,11 +176,6 @@ def _stops(effect: PropertyGroup, index: int | None) -> list[tuple[int, Property
     return [(round(frame), stop) for frame, stop in known if math.isfinite(frame)]
 
 
-def gaps(effect: PropertyGroup, index: int | None) -> list[presence.Gap]:
-    """Return the ranges of timeline frames without a track, ascending."""
-    return presence.gaps(*_track(effect, index))
-
-
 def _track(effect: PropertyGroup, index: int | None) -> tuple[list[int], list[presence.Stop]]:
     """Return the timeline frames with a track, and where it ended."""
     frames, confidence = MotionKeys(effect, index, "LOCATION").confidence()
@@ -222,6 +217,12 @@ def next_unsure(effect: PropertyGroup, index: int | None, frame: float) -> int |
         return None
     stretch = np.flatnonzero(~np.append(unsure[begins[0] :], False))[0]
     return int(frames[begins[0] + confidence[begins[0] : begins[0] + stretch].argmin()])
+
+
+def faults(effect: PropertyGroup, index: int | None) -> list[tuple[int, str, bool]]:
+    """Return where tracking lost the subject, if it did, and its stops, like `stops`."""
+    where = lost(effect, index)
+    return [*([(*where, True)] if where else []), *stops(effect, index)]
 
 
 def lost(effect: PropertyGroup, index: int | None) -> tuple[int, str] | None:

@@ -1,6 +1,5 @@
 """The bar editor: a gizmo in the preview that shows the active shutter's bars, to paint and key them."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import bpy
@@ -105,12 +104,6 @@ def _seen(context: Context) -> tuple[Scene, PropertyGroup, Strip, np.ndarray, li
         return None
 
 
-def _key_colors() -> dict:
-    """Return the theme's colors of keyed fields."""
-    theme = bpy.context.preferences.themes[0].user_interface.wcol_state
-    return {"animated": theme.inner_anim, "keyed": theme.inner_key, "changed": theme.inner_changed}
-
-
 class SHUTTER_GT_bars(Dragged, Gizmo):
     seen = staticmethod(_seen)
 
@@ -169,31 +162,14 @@ class SHUTTER_GT_bars(Dragged, Gizmo):
         bpy.ops.ed.undo_push(message=iface_("Paint Bars", contexts.operator_default))
 
 
-def marked(boxes: Sequence[drawing.Box], combine: str, thickness: float) -> list[tuple[float, float, float, float]]:
-    """Return marks on bars that do not average, visible without colors.
-
-    There is a line below the top of bars of *Lightest*, above the foot of *Darkest*, and across the middle of *Median*.
-
-    Args:
-        boxes: of the bars; left, bottom, right, top.
-    """
-    if combine == "AVERAGE":
-        return []
-    middle = {"LIGHTEST": 1.0, "DARKEST": 0.0, "MEDIAN": 0.5}[combine]
-    starts = [bottom + thickness + middle * (top - bottom - 3 * thickness) for _, bottom, _, top in boxes]
-    open_ones = [(box, start) for box, start in zip(boxes, starts, strict=True) if box[3] - box[1] > 3 * thickness]
-    return [(left, start, right, start + thickness) for (left, _, right, _), start in open_ones]
-
-
 def _draw(place: Layout, shutter: PropertyGroup, values: np.ndarray, states: list[str]) -> None:
     left, bottom, right, _top = place.box
     edges = np.linspace(left, right, place.count + 1)
     thin, foot = drawing.line_width(), drawing.ui_scale() * 3
-    colors = _key_colors()
+    theme = bpy.context.preferences.themes[0].user_interface.wcol_state
+    colors = {"animated": theme.inner_anim, "keyed": theme.inner_key, "changed": theme.inner_changed}
     drawing.rectangles([place.frame], [drawing.BACK])
     boxes = drawing.bars(place.box, np.minimum(values / place.top, 1.0), (*shutter.color, 0.95))
-    marks = marked(boxes, shutter.combine, foot)
-    drawing.rectangles(marks, np.tile((0.0, 0.0, 0.0, 0.7), (len(marks), 1)))
     keyed = [i for i, state in enumerate(states) if state]
     drawing.rectangles(
         [(boxes[i][0], bottom - foot - thin, boxes[i][2], bottom - thin) for i in keyed],

@@ -3,7 +3,6 @@
 It ends with a second click, at another frame, or when the effect changes. Then the view is as before.
 """
 
-from collections.abc import Callable
 from functools import partial
 
 import bpy
@@ -16,9 +15,6 @@ from ..rendering import previews
 from .operator_bases import Named
 
 _TICK = 0.1  # seconds between two checks whether it has ended
-
-
-_back: Callable[[], None] | None = None  # restores the view; it can end without a click
 
 
 class SHUTTER_OT_full_quality(Named, Operator):
@@ -34,7 +30,6 @@ class SHUTTER_OT_full_quality(Named, Operator):
     def execute(self, context: Context) -> set[str]:
         if previews.looking.whole is not None:
             previews.looking.whole = None
-            _end()
         elif found := _shown(context):
             window, area, shown = found
             previews.looking.whole = previews.Whole(shown.effect.scene.session_uid, shown.scene.frame_current)
@@ -55,35 +50,22 @@ def _shown(context: Context) -> tuple[Window, Area, preview_areas.Shown] | None:
 
 
 def _begin(window: Window, area: Area) -> None:
-    global _back
     space, region = area.spaces.active, preview_areas.preview_region(area)
-    _back = partial(_bring_back, area.as_pointer(), (space.proxy_render_size, space.use_proxies), *_view_of(region))
+    back = partial(_bring_back, area.as_pointer(), (space.proxy_render_size, space.use_proxies), *_view_of(region))
     space.proxy_render_size, space.use_proxies = "SCENE", False
     _zoom(window, area, region.height)
-    main_thread.later(_end_when_over, _TICK)
+    main_thread.later(back, _TICK)  # it can end without a click
     preview_areas.redraw()
 
 
-def _end_when_over() -> float | None:
-    if _back is not None and previews.looking.whole is not None:
-        return _TICK
-    _end()
-    return None
-
-
-def _end() -> None:
-    global _back
-    back, _back = _back, None
-    if back is not None:
-        back()
-
-
-def _bring_back(address: int, proxies: tuple[str, bool], rows: float, centre: tuple[float, float]) -> None:
-    """Restore zoom, center and proxy settings of an area, except for those that the user has changed since.
+def _bring_back(address: int, proxies: tuple[str, bool], rows: float, centre: tuple[float, float]) -> float | None:
+    """Restore zoom, center and proxy settings of an area at the end, except for those that the user has changed since.
 
     Args:
         rows, centre: see `_view_of`.
     """
+    if previews.looking.whole is not None:
+        return _TICK
     for window, area in list(preview_areas.previews(bpy.context)):
         if area.as_pointer() != address:
             continue
@@ -94,6 +76,7 @@ def _bring_back(address: int, proxies: tuple[str, bool], rows: float, centre: tu
             _zoom(window, area, rows)
             _centre(window, area, centre)
     preview_areas.redraw()
+    return None
 
 
 def _view_of(region: Region) -> tuple[float, tuple[float, float]]:
@@ -118,10 +101,5 @@ def _centre(window: Window, area: Area, centre: tuple[float, float]) -> None:
         bpy.ops.view2d.pan(deltax=round(x), deltay=round(y))
 
 
-def forget() -> None:
-    """End without restoring the view."""
-    global _back
-    _back = previews.looking.whole = None
-
-
-unregister = forget
+def unregister() -> None:
+    previews.looking.whole = None

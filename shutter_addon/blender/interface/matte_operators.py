@@ -1,6 +1,5 @@
 """Operators for mattes, ramps, time maps and rolling shutters."""
 
-from contextlib import ExitStack
 from pathlib import Path
 
 import bpy
@@ -18,20 +17,18 @@ from ..data import matte_content, recipe_import, selection, strips
 from ..editing import outline_drawings, region_edits, rolling_shutter, shutter_edits
 from ..output import matte_export
 from . import needs
-from .operator_bases import OfEffect, chosen_file, kept, operator
+from .operator_bases import OfEffect, chosen_file, given, kept, operator
 
 
 class SHUTTER_OT_matte_add(OfEffect, ImportHelper, Operator):
     """Make a movie, an image sequence or a picture the matte of the active shutter"""
 
     bl_label = "Matte from File"
+    icon = "FILE_MOVIE"
     needs = (needs.room_for_a_region,)
 
-    channel_name: StringProperty(
-        name="Channel Name",
-        description="Name of a channel of an EXR file; empty for the luminance",
-        maxlen=MAX_CHANNEL,
-        options={"SKIP_SAVE"},
+    channel_name: given(
+        StringProperty, "Channel Name", "Name of a channel of an EXR file; empty for the luminance", maxlen=MAX_CHANNEL
     )
     # What the file browser shows
     filter_movie: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
@@ -55,7 +52,7 @@ def _strips(context: Context) -> list[tuple]:
 STRIP = EnumProperty(name="Strip", items=_strips, translation_context=contexts.no_translation)
 
 
-@operator("Matte from Strip", needs.room_for_a_region, strip=STRIP)
+@operator("Matte from Strip", needs.room_for_a_region, icon="SEQUENCE", strip=STRIP)
 def matte_strip(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Make a movie, image or clip strip of the edit the matte of the active shutter, even if it is muted"""
     region = region_edits.add_region(effect, selection.active_shutter(effect), "MATTE", self.strip, matte="STRIP")
@@ -78,31 +75,27 @@ def _why_no_mask(_effect: PropertyGroup) -> str | None:
 _MASK = EnumProperty(name="Mask", items=_masks, translation_context=contexts.no_translation)
 
 
-@operator("Matte from Mask", needs.room_for_a_region, _why_no_mask, mask=_MASK)
+@operator("Matte from Mask", needs.room_for_a_region, _why_no_mask, icon="MOD_MASK", mask=_MASK)
 def matte_mask(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Make a mask the matte of the active shutter"""
     mask = _mask_named(self.mask)
     region_edits.add_region(effect, selection.active_shutter(effect), "MATTE", mask.name, matte="MASK", mask=mask)
 
 
-@operator("Outline from Mask", needs.room_for_a_region, _why_no_mask, mask=_MASK)
+@operator("Outline from Mask", needs.room_for_a_region, _why_no_mask, icon="CURVE_BEZCIRCLE", mask=_MASK)
 def outline_from_mask(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Make an outline of the active shutter that moves as a mask does"""
     shutter = selection.active_shutter(effect)
     outline_drawings.from_mask(self.edit, effect, self.effect_strip, shutter, _mask_named(self.mask))
 
 
-def _why_not_laid(effect: PropertyGroup) -> str | None:
-    is_laid = selection.active_region(effect).kind in strips.LAID
-    return None if is_laid else rpt_("The region is not a matte, ramp, outline or subject")
-
-
 class SHUTTER_OT_matte_export(OfEffect, ImportHelper, Operator):
     """Write the active matte or outline as pictures, one for each frame of its strip, for other programs"""
 
     bl_label = "Export Matte"
+    icon = "EXPORT"
     bl_options = {"REGISTER"}
-    needs = needs.a_region, _why_not_laid
+    needs = (needs.a_cover,)
 
     directory: StringProperty(name="Folder", subtype="DIR_PATH", options={"SKIP_SAVE"})
     format: EnumProperty(
@@ -125,7 +118,7 @@ class SHUTTER_OT_matte_export(OfEffect, ImportHelper, Operator):
 _RAMP = EnumProperty(name="Ramp", description="Shape of the ramp", items=RAMPS)
 
 
-@operator("Ramp", needs.room_for_a_region, ramp=_RAMP)
+@operator("Ramp", needs.room_for_a_region, icon="IPO_EASE_IN_OUT", ramp=_RAMP)
 def ramp_add(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Make a ramp across the picture the matte of the active shutter"""
     region_edits.add_region(effect, selection.active_shutter(effect), "RAMP", ramp=self.ramp)
@@ -135,7 +128,7 @@ def _why_no_time_map(effect: PropertyGroup) -> str | None:
     return region_edits.why_full(effect, regions=1, shutters=2)
 
 
-@operator("Time Map", needs.a_shutter, _why_no_time_map, ramp=_RAMP)
+@operator("Time Map", needs.a_shutter, _why_no_time_map, icon="TIME", ramp=_RAMP)
 def time_map(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Show every pixel at its own moment: a ramp from the first frame to the last (slit-scan)"""
     shutter_edits.add_time_map(effect, self.ramp)
@@ -153,6 +146,8 @@ class SHUTTER_OT_rolling_shutter(OfEffect, Operator):
     """Show every row as it was when the middle one was filmed, so that skewed lines become straight"""
 
     bl_label = "Rolling Shutter Repair"
+    icon = "CAMERA_DATA"
+    choices = "side"
     needs = (_why_no_repair,)
 
     side: EnumProperty(
@@ -186,16 +181,10 @@ _READS = EnumProperty(
 )
 
 
-@operator("Find Readout", _why_no_repair, reads=_READS)
-def find_readout(self: Operator, context: Context, effect: PropertyGroup) -> None:
+@operator("Find Readout", _why_no_repair, icon="VIEWZOOM", reads=_READS)
+def find_readout(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Find the sensor's readout time from lines that lean while they move around the current frame, and repair it"""
-    with ExitStack() as after:
-        if (window := context.window) is not None:
-            window.cursor_modal_set("WAIT")
-            after.callback(window.cursor_modal_restore)
-        found, side = rolling_shutter.find(
-            self.edit, effect, self.effect_strip, "TOP" if self.reads == "ROWS" else "LEFT"
-        )
+    found, side = rolling_shutter.find(self.edit, effect, self.effect_strip, "TOP" if self.reads == "ROWS" else "LEFT")
     rolling_shutter.repair(self.edit, effect, self.effect_strip, min(abs(found), 1.0), side)
     name = next(name for word, name, _ in SIDES if word == side)
     percent = round(100 * abs(found))

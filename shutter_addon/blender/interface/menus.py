@@ -4,75 +4,45 @@ import bpy
 from bpy.types import Context, Menu, UILayout
 
 from ..data import selection, strips
-from .panel_parts import draw_moves, draw_operators, menu
+from .panel_parts import draw_operators, draw_properties, menu
+
+_OUTLINING = "subject_find", "subject_outline", "subject_scribble", "", "outline_it", "outline_draw", "outline_needed"
+# Menus of operators: end of the name, label, and names for panel_parts.draw_operators.
+_MENUS = {
+    "shutter": ("Shutters", "shutter_add", "shutter_remove", "shutter_duplicate", "shutter_move"),
+    "bars": ("Bars", "bar_set", "preset", "", "bars_key", "bars_unkey"),
+    "outline": ("Outline", *_OUTLINING),
+    "track": ("Track", "track", "track_look", "panning_shot", "", "follow"),
+    "camera": ("Camera", "track_camera", "track_camera_look", "tripod"),
+    "footage": ("Footage", "source", "match_source", "", "smooth_streaks"),
+    "bake": ("Bake", "bake", "bake_stop", "unbake"),
+}
 
 
 @menu("strip", "Shutter")
 def strip_menu(layout: UILayout, _context: Context) -> None:
-    draw_operators(layout, ("add_effect", "ADD"), ("draw", "GREASEPENCIL"), ("erase",))
-    layout.separator()
-    draw_operators(layout, ("effect_copy", "COPYDOWN"), ("effect_paste", "PASTEDOWN"))
+    draw_operators(layout, "add_effect", "draw", "erase", "")
+    draw_operators(layout, "effect_copy", "effect_paste", "recipe_import", "recipe_export", "")
     for end in ("shutter", "bars", "region", "outline", "track", "camera", "footage", "bake", "preview"):
         layout.menu(f"SHUTTER_MT_of_{end}")
-    layout.separator()
-    draw_operators(layout, ("copy_report", "COPYDOWN"))
-
-
-@menu("of_shutter", "Shutters")
-def shutter_menu(layout: UILayout, _context: Context) -> None:
-    draw_operators(layout, ("shutter_add", "ADD"), ("shutter_remove", "REMOVE"))
-    layout.menu_contents("SHUTTER_MT_shutters")
+    draw_operators(layout, "", "copy_report")
 
 
 @menu("of_region", "Regions")
-def region_menu(layout: UILayout, _context: Context) -> None:
+def region_menu(layout: UILayout, context: Context) -> None:
     layout.menu_contents("SHUTTER_MT_regions")
     layout.separator()
-    draw_operators(layout, ("region_transform",), ("region_key", "KEY_HLT"), ("region_assign", "NONE", "shutter"))
-    draw_moves(layout, "region")
-    draw_operators(layout, ("region_remove", "REMOVE"), ("matte_export", "EXPORT"))
-    layout.separator()
-    draw_operators(layout, ("sharp_subject", "RENDERLAYERS"), ("clean_trail", "CURVE_PATH"))
+    active = selection.active(context)
+    if active is not None and (region := selection.active_region(active[1])) is not None:
+        draw_properties(layout, region, "location", "rotation", "scale")
+    draw_operators(layout, "region_key", "region_assign", "region_move", "region_remove", "matte_export")
+    draw_operators(layout, "", "sharp_subject", "clean_trail")
 
 
-# Menus of operators only. End of the name: label, and groups for panel_parts.draw_operators.
-_GROUPS: dict[str, tuple] = {
-    "bars": (
-        "Bars",
-        [("bar_set",), ("preset", "PRESET", "preset")],
-        [("bars_key", "KEY_HLT"), ("bars_unkey", "KEY_DEHLT")],
-    ),
-    "outline": (
-        "Outline",
-        [("subject_find",), ("subject_outline",), ("subject_scribble",)],
-        [("outline_it",), ("outline_draw",)],
-        [("outline_needed",)],
-    ),
-    "track": (
-        "Track",
-        [("track", "NONE", "direction"), ("track_look",), ("panning_shot", "CON_FOLLOWTRACK")],
-        [("follow", "TRACKER")],
-    ),
-    "camera": (
-        "Camera",
-        [("track_camera", "NONE", "direction"), ("track_camera_look",), ("tripod", "CON_CAMERASOLVER")],
-    ),
-    "footage": (
-        "Footage",
-        [("source", "NONE", "strip"), ("match_source",)],
-        [("smooth_streaks",)],
-    ),
-    "bake": ("Bake", [("bake",), ("bake_stop",), ("unbake",)]),
-}
-
-
-def _of_groups(end: str, label: str, *groups: list[tuple[str, ...]]) -> type[Menu]:
+def _of_operators(end: str, label: str, *names: str) -> type[Menu]:
     @menu(f"of_{end}", label)
     def made(layout: UILayout, _context: Context) -> None:
-        for i, group in enumerate(groups):
-            if i:
-                layout.separator()
-            draw_operators(layout, *group)
+        draw_operators(layout, *names)
 
     return made
 
@@ -80,14 +50,10 @@ def _of_groups(end: str, label: str, *groups: list[tuple[str, ...]]) -> type[Men
 @menu("of_preview", "Preview")
 def preview_menu(layout: UILayout, context: Context) -> None:
     live = context.window_manager.virtual_shutter
-    layout.operator("shutter.full_quality")
-    layout.separator()
+    draw_operators(layout, "full_quality", "")
     layout.prop(live, "live")
     layout.prop_menu_enum(live, "view")
-    layout.prop(live, "split")
-    layout.separator()
-    layout.prop(live, "probe")
-    layout.prop(live, "probe_at")
+    draw_properties(layout, live, "split", "probe", "probe_at")
 
 
 def _add_entry(self, _context: Context) -> None:
@@ -103,7 +69,7 @@ def _strip_entry(self, context: Context) -> None:
     if strip.type in strips.SOURCES:
         self.layout.operator("shutter.draw", text="Draw Shutter", icon="GREASEPENCIL")
         self.layout.operator("shutter.add_effect")
-    draw_operators(self.layout, ("effect_copy", "COPYDOWN"), ("effect_paste", "PASTEDOWN"))
+    draw_operators(self.layout, "effect_copy", "effect_paste")
 
 
 def _entry(self, _context: Context) -> None:
@@ -118,7 +84,7 @@ _ENTRIES = (
     ("SEQUENCER_MT_strip", _entry),
 )
 
-classes = tuple(_of_groups(end, *what) for end, what in _GROUPS.items())
+classes = tuple(_of_operators(end, *content) for end, content in _MENUS.items())
 
 
 def register() -> None:

@@ -1,10 +1,15 @@
 """What operators need from an effect. Each function returns why it is missing, in the user's language, or None."""
 
+from collections.abc import Collection
+
+from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import PropertyGroup
 
+from ...core.model.choices import DRAWN
 from ..data import selection, strips
 from ..editing import region_edits
+from .operator_bases import Need
 
 
 def a_shutter(effect: PropertyGroup) -> str | None:
@@ -15,24 +20,25 @@ def a_region(effect: PropertyGroup) -> str | None:
     return None if selection.active_region(effect) is not None else rpt_("The shutter has no region: draw one")
 
 
-def strokes(effect: PropertyGroup) -> str | None:
-    if sentence := a_region(effect):
-        return sentence
-    is_matte = selection.active_region(effect).kind in strips.MATTES
-    return rpt_("The region is a matte or a ramp without strokes") if is_matte else None
+def _of_kind(kinds: Collection[str], sentence: str) -> Need:
+    """Return a need for a region of some kinds.
+
+    Args:
+        sentence: why another region does not fit, in English.
+    """
+
+    def need(effect: PropertyGroup) -> str | None:
+        if without := a_region(effect):
+            return without
+        return None if selection.active_region(effect).kind in kinds else rpt_(sentence)
+
+    return need
 
 
-def an_outline(effect: PropertyGroup) -> str | None:
-    if sentence := a_region(effect):
-        return sentence
-    is_outlined = selection.active_region(effect).kind in strips.OUTLINED
-    return None if is_outlined else rpt_("The region is not an outline or subject")
-
-
-def a_subject(effect: PropertyGroup) -> str | None:
-    if sentence := a_region(effect):
-        return sentence
-    return None if selection.active_region(effect).kind == "SUBJECT" else rpt_("The region is not a subject")
+strokes = _of_kind([word for word, *_ in DRAWN], n_("The region is a matte or a ramp without strokes"))
+an_outline = _of_kind(strips.OUTLINED, n_("The region is not an outline or subject"))
+a_subject = _of_kind({"SUBJECT"}, n_("The region is not a subject"))
+a_cover = _of_kind(strips.LAID, n_("The region is not a matte, ramp, outline or subject"))
 
 
 def room_for_a_region(effect: PropertyGroup) -> str | None:

@@ -1,9 +1,11 @@
 """Base classes and helpers of operators: why they are greyed out, their errors, and operators that run for a while."""
 
 from collections.abc import Callable, Iterable
+from typing import Any
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.props import EnumProperty
 from bpy.types import Context, Event, Operator, PropertyGroup
 
 from ...core import told
@@ -22,26 +24,29 @@ def redraw(context: Context) -> None:
     """Redraw editors that show the effect. Blender does not know that its data changed."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:
-            if area.type in {"SEQUENCE_EDITOR", "PROPERTIES", "DOPESHEET_EDITOR", "GRAPH_EDITOR"}:
+            if area.type in {"SEQUENCE_EDITOR", "DOPESHEET_EDITOR", "GRAPH_EDITOR"}:
                 area.tag_redraw()
 
 
-def report_error(operator: Operator, sentence: str) -> None:
-    """Report a translated sentence as an error, and keep it for *Copy Report* without its names."""
+def report(operator: Operator, sentence: str, kind: str = "WARNING") -> None:
+    """Report a translated sentence as a warning or error, and keep it for *Copy Report* without its names."""
     told.record(level=2)
-    operator.report({"ERROR"}, sentence)
-
-
-def report_warning(operator: Operator, sentence: str) -> None:
-    """Report a translated sentence as a warning, like `report_error`."""
-    told.record(level=2)
-    operator.report({"WARNING"}, sentence)
+    operator.report({kind}, sentence)
 
 
 def popup(context: Context, words: str, **looks: str) -> None:
     """Show a translated sentence in a popup at the pointer."""
     show = context.window_manager.popup_menu
     show(lambda menu, _context: menu.layout.label(text=words, translate=False), **looks)
+
+
+def given(kind: Callable, name: str, description: str, **more: Any) -> Any:
+    """Return a property of an operator that buttons set. Blender would otherwise reuse the last button's value.
+
+    Args:
+        kind: of bpy.props.
+    """
+    return kind(name=name, description=description, options={"SKIP_SAVE"}, **more)
 
 
 def kept(items: Callable[[Context], Iterable[tuple]]) -> Callable[[object, Context], list[tuple]]:
@@ -56,7 +61,14 @@ def kept(items: Callable[[Context], Iterable[tuple]]) -> Callable[[object, Conte
 
 
 class Named(Mixin):
-    """An operator whose bl_idname comes from its class name."""
+    """An operator whose bl_idname comes from its class name.
+
+    Attributes:
+        icon, choices: how menus show it (panel_parts.draw_operators).
+    """
+
+    icon = "NONE"
+    choices = ""
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
@@ -79,7 +91,7 @@ class Named(Mixin):
         try:
             return step(*arguments) or {"FINISHED"}
         except (*FAULTS, UserError) as error:
-            report_error(self, str(error))
+            report(self, str(error), "ERROR")
             return {"CANCELLED"}
 
 
@@ -115,11 +127,16 @@ class OfEffect(Named):
 
 
 def operator(
-    label: str, *needs: Need, options: set[str] = UNDOABLE, only_seen: bool = False, **properties: object
+    label: str,
+    *needs: Need,
+    icon: str = "NONE",
+    options: set[str] = UNDOABLE,
+    only_seen: bool = False,
+    **properties: Any,
 ) -> Callable[[Change], type[Operator]]:
     """Make an operator from a function that changes an effect. Its name, label and docstring become the operator's.
 
-    Other arguments are those of OfEffect, and properties of the operator.
+    Other arguments are those of OfEffect, and properties of the operator, of which menus show the choices of the first.
     """
 
     def made(change: Change) -> type[Operator]:
@@ -128,6 +145,8 @@ def operator(
             "__module__": change.__module__,
             "__annotations__": properties,
             "bl_label": label,
+            "icon": icon,
+            "choices": next((name for name, made in properties.items() if made.function is EnumProperty), ""),
             "bl_options": options,
             "only_seen": only_seen,
             "needs": needs,

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import bpy
 from bpy.app.translations import contexts
-from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 from bpy.types import Context, Event, Operator, PropertyGroup
@@ -22,6 +21,7 @@ from ..editing import add_effect, bar_edits, drawn_places, region_edits, shown_a
 from ..editing import match_source as matching
 from ..output import error_report, matte_export
 from . import needs, sharp_frame
+from .bar_editor import bar_under
 from .matte_operators import STRIP
 from .operator_bases import (
     UNDOABLE,
@@ -29,13 +29,13 @@ from .operator_bases import (
     Named,
     OfEffect,
     chosen_file,
+    given,
     kept,
     operator,
     redraw,
-    report_error,
-    report_warning,
+    report,
 )
-from .panel_parts import icon_of
+from .panel_parts import draw_properties, icon_of
 
 
 def why_no_effect(context: Context) -> str | None:
@@ -67,6 +67,7 @@ class SHUTTER_OT_add_effect(Named, Operator):
     """Add a Shutter strip, which gives every pixel its own exposure, above the active strip"""
 
     bl_label = "Add Shutter Strip"
+    icon = "ADD"
     bl_options = UNDOABLE
     refusal = staticmethod(why_no_effect)
 
@@ -98,7 +99,7 @@ def match_source(self: Operator, _context: Context, effect: PropertyGroup) -> No
     """Copy transform, crop, flip, color and range of the source to the Shutter strip (strokes stay on the picture)"""
     if (neighbor := matching.match(effect)) is not None:
         sentence = rpt_('"{neighbor}" is in the way: "{strip}" does not have the whole range of its source')
-        report_warning(self, sentence.format(neighbor=neighbor.name, strip=self.effect_strip.name))
+        report(self, sentence.format(neighbor=neighbor.name, strip=self.effect_strip.name))
 
 
 def _why_smooth(effect: PropertyGroup) -> str | None:
@@ -112,7 +113,7 @@ def smooth_streaks(_self: Operator, _context: Context, effect: PropertyGroup) ->
 
 
 def show_panel(context: Context) -> None:
-    """Open the sidebar's Shutter tab in all previews. In the Properties editor it is below all other panels."""
+    """Open the sidebar's Shutter tab in all previews."""
     for _window, area in preview_areas.previews(context):
         area.spaces.active.show_region_ui = True
     # A sidebar has no tabs before it is drawn. A slow window draws it late; one without room never does.
@@ -131,13 +132,13 @@ def _choose_tab(waits: Iterator[float]) -> float | None:
     return None
 
 
-@operator("Add Shutter", needs.room_for_a_shutter)
+@operator("Add Shutter", needs.room_for_a_shutter, icon="ADD")
 def shutter_add(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Add a shutter that is fully open"""
     shutter_edits.add_shutter(effect)
 
 
-@operator("Duplicate Shutter", needs.a_shutter, needs.room_for_a_shutter)
+@operator("Duplicate Shutter", needs.a_shutter, needs.room_for_a_shutter, icon="DUPLICATE")
 def shutter_duplicate(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Add a copy of the active shutter, keyframes included"""
     shutter_edits.duplicate_shutter(effect, effect.active_shutter)
@@ -147,7 +148,7 @@ def _why_last(effect: PropertyGroup) -> str | None:
     return rpt_("The last shutter of an effect cannot be removed") if len(effect.shutters) == 1 else None
 
 
-@operator("Remove Shutter", _why_last, needs.a_shutter)
+@operator("Remove Shutter", _why_last, needs.a_shutter, icon="REMOVE")
 def shutter_remove(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Remove the active shutter and its regions"""
     shutter_edits.remove_shutter(effect, effect.active_shutter)
@@ -182,23 +183,23 @@ def _presets(_context: Context) -> list[tuple]:
 _PRESET = EnumProperty(name="Preset", items=_presets, translation_context=CONTEXT)
 
 
-@operator("Apply Shutter Preset", needs.a_shutter, preset=_PRESET)
+@operator("Apply Shutter Preset", needs.a_shutter, icon="PRESET", preset=_PRESET)
 def preset(self: Operator, context: Context, effect: PropertyGroup) -> None:
     """Give the active shutter the bars of a preset"""
     shutter_edits.apply_preset(effect, effect.active_shutter, self.preset, bar_edits.auto_key(context))
 
 
-@operator("Insert Bar Keyframes", needs.a_shutter)
+@operator("Insert Bar Keyframes", needs.a_shutter, icon="KEY_HLT")
 def bars_key(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Insert keyframes for all bars of the active shutter at the current frame"""
     bar_edits.key_bars(effect, effect.active_shutter)
 
 
-@operator("Delete Bar Keyframes", needs.a_shutter)
+@operator("Delete Bar Keyframes", needs.a_shutter, icon="KEY_DEHLT")
 def bars_unkey(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
     """Delete the keyframes of all bars of the active shutter at the current frame"""
     if not bar_edits.unkey_bars(effect, effect.active_shutter):
-        report_warning(self, rpt_("No bar has a keyframe at the current frame"))
+        report(self, rpt_("No bar has a keyframe at the current frame"))
         return {"CANCELLED"}
     return None
 
@@ -213,17 +214,12 @@ class SHUTTER_OT_bar_set(OfEffect, Operator):
     weight: FloatProperty(name="Weight", description="Contribution of the bar's frame", min=0.0, soft_max=1.0)
 
     def invoke(self, context: Context, event: Event) -> set[str]:
-        from .bar_editor import bar_under
-
-        is_clicked = event.value == "DOUBLE_CLICK"  # from a menu, the pointer is anywhere
-        place = bar_under(context, event.mouse_region_x, event.mouse_region_y) if is_clicked else None
-        self.is_pointed_at = place is not None
-        if place is not None:
-            self.bar = place + 1
+        if event.value == "DOUBLE_CLICK":  # from a menu, the pointer is anywhere
+            place = bar_under(context, event.mouse_region_x, event.mouse_region_y)
+            self.bar = self.bar if place is None else place + 1
         if self.tried(self._read, selection.active(context)[1]) == {"CANCELLED"}:
             return {"CANCELLED"}
-        title = iface_("Bar {number}").format(number=self.bar) if self.is_pointed_at else ""
-        return context.window_manager.invoke_props_dialog(self, width=200, title=title)
+        return context.window_manager.invoke_props_dialog(self, width=200)
 
     def _read(self, effect: PropertyGroup) -> None:
         bars = bar_edits.bars_now(effect, effect.active_shutter)
@@ -231,9 +227,7 @@ class SHUTTER_OT_bar_set(OfEffect, Operator):
 
     def draw(self, _context: Context) -> None:
         self.layout.activate_init = True
-        if not getattr(self, "is_pointed_at", False):  # from a menu
-            self.layout.prop(self, "bar")
-        self.layout.prop(self, "weight")
+        draw_properties(self.layout, self, "weight", "bar")
 
     def change(self, context: Context, effect: PropertyGroup) -> None:
         weights = bar_edits.bars_now(effect, effect.active_shutter)
@@ -251,28 +245,13 @@ class SHUTTER_OT_draw(MakesEffect, OfEffect, Operator):
     """Draw on the sharp frame where the active shutter is used (at another frame, this redraws the active region)"""
 
     bl_label = "Draw"
+    icon = "GREASEPENCIL"
     only_seen = True
     needs = needs.a_shutter, _why_no_room
 
-    # SKIP_SAVE: Blender would otherwise reuse the values of the last button.
-    new: BoolProperty(
-        name="New Region",
-        description="Start a new region instead of adding strokes to the active one",
-        options={"SKIP_SAVE"},
-    )
-    kind: EnumProperty(
-        name="Type",
-        description="How the strokes cover the picture",
-        items=DRAWN,
-        translation_context=CONTEXT,
-        options={"SKIP_SAVE"},
-    )
-
-    not_this: BoolProperty(
-        name="Not This",
-        description="Draw on what the active subject is not",
-        options={"SKIP_SAVE"},
-    )
+    new: given(BoolProperty, "New Region", "Start a new region instead of adding strokes to the active one")
+    kind: given(EnumProperty, "Type", "How the strokes cover the picture", items=DRAWN, translation_context=CONTEXT)
+    not_this: given(BoolProperty, "Not This", "Draw on what the active subject is not")
 
     def change(self, context: Context, effect: PropertyGroup) -> None:
         region = selection.active_region(effect)
@@ -311,14 +290,9 @@ def drawing_tool(
     if annotations.layer_of(effect, region, layer) is None:
         region_edits.new_layer(effect, region, layer)
     consistency.aim_pen(effect, layer)
-    _show_annotation(context, effect)
-    return sharp_frame.take_up(context, tool)
-
-
-def _show_annotation(context: Context, effect: PropertyGroup) -> None:
-    """Show the effect's annotation in all previews."""
     for _window, area in preview_areas.previews(context):
         shown_annotations.give(area.spaces.active, effect.scene.annotation)
+    return sharp_frame.take_up(context, tool)
 
 
 @kept
@@ -336,7 +310,7 @@ def region_assign(self: Operator, _context: Context, effect: PropertyGroup) -> N
     region_edits.assign_region(effect, effect.active_region, effect.shutters[int(self.shutter)])
 
 
-@operator("Remove Region", needs.a_region)
+@operator("Remove Region", needs.a_region, icon="REMOVE")
 def region_remove(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Remove the active region and its strokes"""
     region_edits.remove_region(effect, effect.active_region)
@@ -350,30 +324,31 @@ def region_move(self: Operator, _context: Context, effect: PropertyGroup) -> set
     return _move(places, effect.active_region, self.direction, partial(region_edits.move_region, effect))
 
 
-@operator("Insert Region Keyframes", needs.a_region)
+@operator("Insert Region Keyframes", needs.a_region, icon="KEY_HLT")
 def region_key(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Insert keyframes for location, rotation and scale of the active region at the current frame"""
     region_edits.key_region(effect, effect.active_region)
 
 
-@operator("Choose Source", strip=STRIP)
+@operator("Choose Source", icon="SEQUENCE", strip=STRIP)
 def source(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Choose the movie, image or clip strip whose frames the effect exposes"""
     add_effect.choose_source(effect, self.effect_strip, self.edit.sequence_editor.strips_all[self.strip])
 
 
-@operator("Copy Effect", options={"REGISTER"})
+@operator("Copy Effect", icon="COPYDOWN", options={"REGISTER"})
 def effect_copy(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Copy the shutters, regions, keyframes and options of the effect, for other strips and scenes of this file"""
     undelete.copy(effect, self.effect_strip)
     if data_format.is_newer(self.edit):
-        report_warning(self, rpt_("Copied without data of a newer version of Virtual Shutter"))
+        report(self, rpt_("Copied without data of a newer version of Virtual Shutter"))
 
 
 class SHUTTER_OT_effect_paste(MakesEffect, OfEffect, Operator):
     """Paste the copied effect to the active strip, replacing its effect"""
 
     bl_label = "Paste Effect"
+    icon = "PASTEDOWN"
 
     @classmethod
     def refusal(cls, context: Context) -> str | None:
@@ -387,6 +362,7 @@ class SHUTTER_OT_recipe_import(OfEffect, ImportHelper, Operator):
     """Replace the shutters, regions, keyframes and options of the effect with those of a recipe file"""
 
     bl_label = "Import Recipe"
+    icon = "IMPORT"
     filename_ext = ".json"
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
@@ -395,13 +371,14 @@ class SHUTTER_OT_recipe_import(OfEffect, ImportHelper, Operator):
         found = recipe_file.load(path)
         recipe_import.apply(self.edit, effect, self.effect_strip, found, path.parent)
         if found.lost is not None:
-            report_warning(self, rpt_(found.lost.template).format(**found.lost.words))
+            report(self, rpt_(found.lost.template).format(**found.lost.words))
 
 
 class SHUTTER_OT_recipe_export(OfEffect, ExportHelper, Operator):
     """Save the shutters, regions, keyframes and options of the effect as a recipe file"""
 
     bl_label = "Export Recipe"
+    icon = "EXPORT"
     bl_options = {"REGISTER"}
     filename_ext = ".json"
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
@@ -414,7 +391,7 @@ class SHUTTER_OT_recipe_export(OfEffect, ExportHelper, Operator):
             raise UserError(f"{path}: {error.strerror or error}") from None
         if data_format.is_newer(self.edit):
             words = rpt_('Saved "{path}" without data of a newer version of Virtual Shutter')
-            report_warning(self, words.format(path=path))
+            report(self, words.format(path=path))
         else:
             self.report({"INFO"}, rpt_('Saved "{path}"').format(path=path))
 
@@ -423,11 +400,9 @@ class SHUTTER_OT_copy_report(Named, Operator):
     """Copy versions, device, types and numbers of the edit, and last errors: no names, no paths. Nothing is sent"""
 
     bl_label = "Copy Report"
+    icon = "COPYDOWN"
 
     def execute(self, context: Context) -> set[str]:
-        if bpy.app.background:
-            report_error(self, rpt_("Without a window there is no clipboard: use the command check with --report"))
-            return {"CANCELLED"}
         context.window_manager.clipboard = error_report.text(selection.scene_of(context))
         self.report({"INFO"}, rpt_("Report copied: paste it into your message and read it before you send it"))
         return {"FINISHED"}

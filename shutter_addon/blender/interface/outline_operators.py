@@ -16,7 +16,7 @@ from ..editing import outline_drawings, track_region
 from ..rendering import outline_carrying
 from . import drawing, needs
 from .gizmo_groups import Dragged, View, WithKeys, view
-from .operator_bases import Beside, OfEffect, operator, redraw, report_warning, show_status
+from .operator_bases import Beside, OfEffect, operator, redraw, report, show_status
 from .preview import show_carried
 from .region_gizmo import SHUTTER_GGT_region
 
@@ -85,7 +85,7 @@ def outline_draw(self: Operator, _context: Context, effect: PropertyGroup) -> se
     scene, strip, index = self.edit, self.effect_strip, effect.active_region
     curves = outline_drawings.curves_now(scene, effect, strip, index)
     if not curves:
-        report_warning(self, rpt_("The outline is empty at the current frame"))
+        report(self, rpt_("The outline is empty at the current frame"))
         return {"CANCELLED"}
     outline_drawings.draw(effect, strip, effect.regions[index], curves, scene.frame_current)
     return None
@@ -95,7 +95,7 @@ def outline_draw(self: Operator, _context: Context, effect: PropertyGroup) -> se
 def outline_it(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
     """Make the active region an outline of the subject that its strokes mark or enclose at this frame"""
     if not outline_drawings.outline_it(self.edit, effect, self.effect_strip, effect.active_region):
-        report_warning(self, rpt_("No subject stands out from its surroundings"))
+        report(self, rpt_("No subject stands out from its surroundings"))
         return {"CANCELLED"}
     return None
 

@@ -1,14 +1,14 @@
 """Parts of panels: sentences, lists, buttons, and the icons of presets and patterns."""
 
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import Any
 
 import bpy.utils.previews
 import numpy as np
-from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_iface as iface_
-from bpy.app.translations import pgettext_n as n_
-from bpy.types import Context, Menu, PropertyGroup, Scene, Strip, UILayout
+from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.types import Context, Menu, Panel, PropertyGroup, Scene, Strip, UILayout
 from bpy.utils.previews import ImagePreviewCollection
 
 from ...core.model import shutters
@@ -16,7 +16,6 @@ from ...core.model.fields import fields_of
 from ...core.pixels import patterns
 from ..data import selection
 from . import drawing
-from .operator_bases import Mixin
 
 Draws = Callable[[UILayout, Scene, PropertyGroup, Strip], None]  # draws the content of a panel
 
@@ -28,7 +27,6 @@ _MOST_ROWS = 5  # rows of a list without scrolling
 _SIZE, _WINDOW = 32, 8  # pixels of an icon; bars that it shows
 _UNITS = 16  # interface units along each side of an icon
 _LIGHT = (0.8, 0.8, 0.8)
-_icons: list[ImagePreviewCollection] = []  # one item while the extension is registered
 
 
 def sentence(layout: UILayout, words: str, icon: str = "NONE", room: float = 1.0, is_quiet: bool = False) -> None:
@@ -49,6 +47,15 @@ def sentence(layout: UILayout, words: str, icon: str = "NONE", room: float = 1.0
         row = column.row()
         row.scale_y = 0.8 if i else 1.0
         row.label(text=line, icon=icon if i == 0 or icon == "NONE" else "BLANK1", translate=False)
+
+
+def too_few_frames(step: float) -> str:
+    """Return a note about an exposure that shows copies.
+
+    Args:
+        step: pixels from one exposed frame to the next.
+    """
+    return rpt_("Too few frames: steps of {pixels} pixels").format(pixels=f"{step:.0f}")
 
 
 def draw_fields(layout: UILayout, owner: PropertyGroup, kind: type) -> None:
@@ -81,31 +88,24 @@ def draw_list(
     if menu:
         column.menu(menu, text="", icon="DOWNARROW_HLT")
     elif len(items) > 1:
-        draw_moves(column, kind, has_text=False)
+        for direction, icon in (("UP", "TRIA_UP"), ("DOWN", "TRIA_DOWN")):
+            column.operator(f"shutter.{kind}_move", text="", icon=icon).direction = direction
 
 
-def draw_moves(layout: UILayout, kind: str, *, has_text: bool = True) -> None:
-    """Draw the buttons that move the active shutter or region in its list."""
-    ways = (
-        ("UP", n_("Move Up", contexts.operator_default), "TRIA_UP"),
-        ("DOWN", n_("Move Down", contexts.operator_default), "TRIA_DOWN"),
-    )
-    for direction, text, icon in ways:
-        layout.operator(f"shutter.{kind}_move", text=text if has_text else "", icon=icon).direction = direction
+def draw_operators(layout: UILayout, *names: str) -> None:
+    """Draw operators of the extension, and a separator for "".
 
-
-def draw_operators(layout: UILayout, *entries: tuple[str, ...]) -> None:
-    """Draw operators of the extension. An entry has a name, an icon and a property whose items become a submenu."""
-    for entry in entries:
-        _draw_operator(layout, *entry)
-
-
-def _draw_operator(layout: UILayout, name: str, icon: str = "NONE", prop: str = "") -> None:
-    """prop: whose items are a menu of their own"""
-    if prop:
-        layout.operator_menu_enum(f"shutter.{name}", prop, icon=icon)
-    else:
-        layout.operator(f"shutter.{name}", icon=icon)
+    An operator's `icon` is beside it, and the items of its property `choices` are a submenu.
+    """
+    for name in names:
+        if not name:
+            layout.separator()
+            continue
+        kind = getattr(bpy.types, f"SHUTTER_OT_{name}")
+        if kind.choices and kind.poll(bpy.context):
+            layout.operator_menu_enum(f"shutter.{name}", kind.choices, icon=kind.icon)
+        else:  # greyed out, its tooltip says why
+            layout.operator(f"shutter.{name}", icon=kind.icon)
 
 
 def draw_properties(layout: UILayout, owner: bpy.types.bpy_struct, *names: str) -> None:
@@ -118,26 +118,35 @@ def draw_progress(layout: UILayout, done: int, total: int) -> None:
     layout.progress(factor=done / max(total, 1), text=text, translate=False)
 
 
-def of_effect(label: str, draws: Draws, shows: Callable[[PropertyGroup], Any] | None = None, **look: object) -> type:
-    """Make a panel that shows the effect, closed by default.
+def panel(
+    end: str,
+    label: str,
+    draws: Draws,
+    shows: Callable[[PropertyGroup], Any] | None = None,
+    within: str = "",
+    **look: object,
+) -> type[Panel]:
+    """Make a panel of the Shutter tab that shows the effect, closed by default.
 
     Args:
+        end: of its name. `within` is that of the panel that contains it.
         draws: draws its content.
         shows: returns what the panel shows of an effect; without it the panel is hidden.
         look: other class attributes for Blender.
     """
 
-    class Drawn(Mixin):
-        @classmethod
-        def poll(cls, context: Context) -> bool:
-            active = selection.active(context) if super().poll(context) else None
-            return active is not None and (shows is None or bool(shows(active[1])))
+    def poll(_cls: type[Panel], context: Context) -> bool:
+        active = selection.active(context)
+        return active is not None and (shows is None or bool(shows(active[1])))
 
-        def draw(self, context: Context) -> None:
-            self.layout.use_property_split = True
-            draws(self.layout, *selection.active(context))
+    def draw(self: Panel, context: Context) -> None:
+        self.layout.use_property_split = True
+        draws(self.layout, *selection.active(context))
 
-    return type("Drawn", (Drawn,), {"bl_label": label, "bl_options": {"DEFAULT_CLOSED"}} | look)
+    place = {"bl_space_type": "SEQUENCE_EDITOR", "bl_region_type": "UI", "bl_category": "Shutter"}
+    content = {"bl_label": label, "bl_options": {"DEFAULT_CLOSED"}, "poll": classmethod(poll), "draw": draw}
+    parent = {"bl_parent_id": f"SEQUENCER_PT_shutter{within}"}
+    return type(f"SEQUENCER_PT_shutter{end}", (Panel,), place | content | parent | look)
 
 
 def menu(name: str, label: str) -> Callable[[Callable[[UILayout, Context], None]], type[Menu]]:
@@ -153,9 +162,22 @@ def menu(name: str, label: str) -> Callable[[Callable[[UILayout, Context], None]
     return made
 
 
+@cache
+def _icons() -> ImagePreviewCollection:
+    """Return the icons of presets and patterns."""
+    icons = bpy.utils.previews.new()
+    pictures = {name: _drawn(shutters.preset_bars(name, _WINDOW)) for name in shutters.PRESETS}
+    pictures |= {str(index): _painted(index) for index in range(patterns.COUNT)}
+    for name, picture in pictures.items():
+        icon = icons.new(name)
+        icon.icon_size = icon.image_size = (_SIZE, _SIZE)
+        icon.icon_pixels_float = icon.image_pixels_float = picture.ravel()
+    return icons
+
+
 def icon_of(name: str) -> int:
     """Return the icon of a preset; 0 in the background."""
-    return _icons[0][name].icon_id if _icons and name in _icons[0] else 0
+    return _icons()[name].icon_id
 
 
 def pattern_icon(index: int) -> int:
@@ -181,15 +203,6 @@ def _painted(index: int) -> np.ndarray:
     return picture
 
 
-def register() -> None:
-    _icons.append(bpy.utils.previews.new())
-    pictures = {name: _drawn(shutters.preset_bars(name, _WINDOW)) for name in shutters.PRESETS}
-    pictures |= {str(index): _painted(index) for index in range(patterns.COUNT)}
-    for name, picture in pictures.items():
-        icon = _icons[0].new(name)
-        icon.icon_size = icon.image_size = (_SIZE, _SIZE)
-        icon.icon_pixels_float = icon.image_pixels_float = picture.ravel()
-
-
 def unregister() -> None:
-    bpy.utils.previews.remove(_icons.pop())
+    bpy.utils.previews.remove(_icons())
+    _icons.cache_clear()

@@ -1,4 +1,4 @@
-"""Panels, lists and menus in the Properties editor's Strip tab and in the sequencer's sidebar."""
+"""Panels, lists and menus in the sequencer's sidebar."""
 
 from collections.abc import Iterator
 
@@ -13,20 +13,18 @@ from ...core.model.effect import Shutter
 from ..data import annotations, consistency, data_format, selection, strips
 from ..editing import bar_edits, match_source
 from ..rendering import strobing
-from . import bake_operators, note_buttons, region_panels
-from .note_buttons import Button
-from .operator_bases import Mixin
+from . import bake_operators, region_panels
 from .panel_parts import (
     WIDEST,
     draw_fields,
     draw_list,
-    draw_moves,
     draw_operators,
     draw_properties,
     menu,
-    of_effect,
+    panel,
     pattern_icon,
     sentence,
+    too_few_frames,
 )
 
 
@@ -88,52 +86,48 @@ def region_menu(layout: UILayout, _context: Context) -> None:
     subject.new, subject.kind = True, "SUBJECT"
     outline = layout.operator("shutter.draw", text="Draw Outline", icon=_ICONS["OUTLINE"])
     outline.new, outline.kind = True, "OUTLINE"
-    layout.separator()
-    draw_operators(layout, ("matte_add", "FILE_MOVIE"), ("matte_strip", "SEQUENCE", "strip"))
-    # Without a mask they are greyed out, and the tooltip says why.
-    mask = ("mask",) if bpy.data.masks else ()
-    draw_operators(layout, ("matte_mask", "MOD_MASK", *mask), ("outline_from_mask", _ICONS["OUTLINE"], *mask))
-    draw_operators(layout, ("ramp_add", "IPO_EASE_IN_OUT", "ramp"))
-    layout.separator()
-    draw_operators(layout, ("time_map", "TIME", "ramp"), ("rolling_shutter", "CAMERA_DATA", "side"))
-    draw_operators(layout, ("find_readout", "VIEWZOOM", "reads"))
+    draw_operators(layout, "", "matte_add", "matte_strip", "matte_mask", "outline_from_mask", "ramp_add")
+    draw_operators(layout, "", "time_map", "rolling_shutter", "find_readout")
 
 
 @menu("shutters", "Shutter Specials")
 def shutter_menu(layout: UILayout, _context: Context) -> None:
     layout.menu("SHUTTER_MT_presets", icon="PRESET")
-    layout.separator()
-    draw_operators(layout, ("shutter_duplicate", "DUPLICATE"))
-    draw_moves(layout, "shutter")
-    layout.separator()
-    draw_operators(layout, ("effect_copy", "COPYDOWN"), ("effect_paste", "PASTEDOWN"))
-    draw_operators(layout, ("recipe_import", "IMPORT"), ("recipe_export", "EXPORT"))
+    draw_operators(layout, "", "shutter_duplicate", "shutter_move")
+    draw_operators(layout, "", "effect_copy", "effect_paste", "recipe_import", "recipe_export")
 
 
-class _Shutters(Mixin):
+class SEQUENCER_PT_shutter(Panel):
     """The first panel. It fits into Blender's default layout without scrolling."""
 
     bl_label = "Shutter"
+    bl_space_type = "SEQUENCE_EDITOR"
+    bl_region_type = "UI"
+    bl_category = "Shutter"
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        return selection.active_strip(context) is not None or selection.active(context) is not None
 
     def draw(self, context: Context) -> None:
         layout = self.layout
         active = selection.active(context)
         if active is None:
-            draw_operators(layout, ("draw", "GREASEPENCIL"), ("add_effect", "ADD"))
+            draw_operators(layout, "draw", "add_effect")
             return
         effect = active[1]
         _draw_live(layout, context)
         _draw_source(layout, effect)
         draw_list(layout, effect, "shutter", effect.shutters, "SHUTTER_MT_shutters")
         row = layout.row(align=True)
-        draw_operators(row, ("draw", "GREASEPENCIL"))
+        draw_operators(row, "draw")
         region = selection.active_region(effect)
         if is_subject := region is not None and region.kind == "SUBJECT":
             row.operator("shutter.draw", text="Not This", icon="X").not_this = True
-        draw_operators(row, ("erase",))
+        draw_operators(row, "erase")
         row.menu("SHUTTER_MT_regions", text="", icon="DOWNARROW_HLT")
         region_panels.draw_tracking(layout, effect.active_region, is_subject)
-        draw_operators(layout.row(align=True), ("sharp_subject",), ("panning_shot",), ("clean_trail",))
+        draw_operators(layout.row(align=True), "sharp_subject", "panning_shot", "clean_trail")
 
 
 def _draw_header(self: Panel, context: Context) -> None:
@@ -162,7 +156,7 @@ def _draw_exposure(layout: UILayout, scene: Scene, effect: PropertyGroup, strip:
         layout.prop(shutter, "trail")
     _draw_combine(layout, shutter)
     draw_fields(layout, shutter, Shutter)
-    layout.operator("shutter.tripod", icon="CON_CAMERASOLVER")
+    draw_operators(layout, "tripod")
     _draw_bars(layout, scene, effect, strip)
 
 
@@ -202,6 +196,7 @@ def _draw_live(layout: UILayout, context: Context) -> None:
     view.active = live.live
     view.prop(live, "view", text="")
     view.prop(live, "probe", text="", icon="EYEDROPPER")
+    row.operator("shutter.full_quality", text="", icon="VIEW_ZOOM")
     notes = row.row(align=True)
     effect = selection.active(context)[1]
     found = {region_panels.tracking_icon(effect, index) for index in _tracked(effect)} | {
@@ -219,24 +214,24 @@ def _draw_source(layout: UILayout, effect: PropertyGroup) -> None:
     layout.operator_menu_enum("shutter.source", "strip", text=words, icon="SEQUENCE", translate=False)
 
 
-def _notes(context: Context) -> Iterator[tuple[str, Button | None]]:
-    """Yield notes on the active effect, each with the button that helps. An empty label means the operator's own."""
+def _notes(context: Context) -> Iterator[tuple[str, str]]:
+    """Yield notes on the active effect, each with the operator that helps, or ""."""
     scene, effect, strip = selection.active(context)
     if (newer := data_format.note([scene, *bpy.data.scenes])) is not None:
-        yield newer, None
+        yield newer, ""
     if selection.in_picture(context) is None:
-        yield selection.why_unseen(scene, strip), None
+        yield selection.why_unseen(scene, strip), ""
     if (shown := match_source.shown(effect)) is not None:
         if shown.differences:
             what = ", ".join(iface_(word) for word in shown.differences)
-            yield iface_("Differs from its source: {what}").format(what=what), ("shutter.match_source", "")
+            yield iface_("Differs from its source: {what}").format(what=what), "shutter.match_source"
         if shown.lacks_modifiers:
-            yield iface_("The effect does not use the modifiers of the source"), None
+            yield iface_("The effect does not use the modifiers of the source"), ""
         if shown.has_effects:
             words = iface_("The effect does not use effect strips of the source: make the Shutter strip their input")
-            yield words, None
+            yield words, ""
     if (step := strobing.last(effect)) is not None:
-        yield note_buttons.of_strobing(step)
+        yield too_few_frames(step), "shutter.smooth_streaks"
 
 
 def _tracked(effect: PropertyGroup) -> list[int | None]:
@@ -260,12 +255,11 @@ class SHUTTER_PT_notes(Panel):
 
     def draw(self, context: Context) -> None:
         layout, effect = self.layout, selection.active(context)[1]
-        for words, button in _notes(context):
+        for words, operator in _notes(context):
             column = layout.column(align=True)
             sentence(column, words, "INFO")
-            if button is not None:
-                operator, label = button
-                column.operator(operator, **({"text": label, "translate": False} if label else {}))
+            if operator:
+                column.operator(operator)
         for index in _tracked(effect):
             region_panels.draw_tracked(layout, effect, index)
 
@@ -295,64 +289,22 @@ def _draw_options(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip
         sentence(column, iface_("Smooth is off: the nearest source frame is used"), "INFO")
 
 
-class _Report(Mixin):
-    """The last panel, with or without an effect."""
-
-    bl_label = "Report"
-    bl_options = {"HIDE_HEADER"}
-
-    def draw(self, _context: Context) -> None:
-        self.layout.operator("shutter.copy_report", icon="COPYDOWN")
-
-
-class _InProperties:
-    bl_space_type = "PROPERTIES"
-    bl_region_type = "WINDOW"
-    bl_context = "strip"
-
-    @classmethod
-    def poll(cls, context: Context) -> bool:
-        strip = selection.active_strip(context)
-        return strip is not None and (strip.type in strips.SOURCES or selection.active(context) is not None)
-
-
-class _InSidebar:
-    bl_space_type = "SEQUENCE_EDITOR"
-    bl_region_type = "UI"
-    bl_category = "Shutter"
-
-    @classmethod
-    def poll(cls, context: Context) -> bool:
-        return selection.active_strip(context) is not None or selection.active(context) is not None
-
-
-# End of each panel's name: its content, and the panel that contains it.
-_PANELS = {
-    "": (_Shutters, None),
-    "_regions": (of_effect("Regions", region_panels.draw_regions, bl_options=set()), ""),
-    "_transform": (of_effect("Transform", region_panels.draw_transform, selection.active_region), "_regions"),
-    "_track": (
-        of_effect("Track", region_panels.draw_track, region_panels.has_strokes, bl_translation_context=CONTEXT),
+classes = (
+    SEQUENCER_PT_shutter,
+    panel("_regions", "Regions", region_panels.draw_regions, bl_options=set()),
+    panel("_transform", "Transform", region_panels.draw_transform, selection.active_region, "_regions"),
+    panel(
+        "_track",
+        "Track",
+        region_panels.draw_track,
+        region_panels.has_strokes,
         "_regions",
+        bl_translation_context=CONTEXT,
     ),
-    "_follow": (of_effect("Follow Track", region_panels.draw_follow, selection.active_region), "_regions"),
-    "_exposure": (
-        of_effect("", _draw_exposure, selection.active_shutter, bl_options=set(), draw_header=_draw_header),
-        "",
-    ),
-    "_move": (of_effect("Exposure Moves With", _draw_move, selection.active_shutter), "_exposure"),
-    "_camera": (of_effect("Camera", region_panels.draw_camera, region_panels.has_camera), ""),
-    "_options": (of_effect("Options", _draw_options), ""),
-    "_bake": (of_effect("Bake", bake_operators.draw_panel), ""),
-    "_report": (_Report, ""),
-}
-
-
-def _panels(start: str, place: type) -> list[type]:
-    return [
-        type(start + end, (drawn, place, Panel), {} if within is None else {"bl_parent_id": start + within})
-        for end, (drawn, within) in _PANELS.items()
-    ]
-
-
-classes = (*_panels("STRIP_PT_shutter", _InProperties), *_panels("SEQUENCER_PT_shutter", _InSidebar))
+    panel("_follow", "Follow Track", region_panels.draw_follow, selection.active_region, "_regions"),
+    panel("_exposure", "", _draw_exposure, selection.active_shutter, bl_options=set(), draw_header=_draw_header),
+    panel("_move", "Exposure Moves With", _draw_move, selection.active_shutter, "_exposure"),
+    panel("_camera", "Camera", region_panels.draw_camera, region_panels.has_camera),
+    panel("_options", "Options", _draw_options),
+    panel("_bake", "Bake", bake_operators.draw_panel),
+)

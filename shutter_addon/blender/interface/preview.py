@@ -1,26 +1,28 @@
 """The live preview: pictures, views, strokes and notes that a handler draws over the sequencer's picture."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cache
 
 import bpy
 import gpu
 import numpy as np
-from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, PointerProperty
+from bpy.props import PointerProperty
 from bpy.types import Context, PropertyGroup, Region
 
 from ...compute.renderer import Renderer
 from ...compute.request import Request
 from ...core import stopping
+from ...core.model import fields
 from ...core.model.choices import CONTEXT
 from ...core.model.effect import SubjectRegion
 from ...core.model.frame_state import FrameState
 from ...devices.device import Texture
 from ..data import annotations, preview_areas, selection
 from ..data.preview_areas import Shown
+from ..data.properties import with_fields
 from ..data.snapshot import Snapshot
 from ..devices import blender_gpu, main_thread
 from ..editing import shown_annotations
@@ -35,9 +37,9 @@ from ..rendering import (
     strobing,
 )
 from ..rendering.previews import Decision, Drawing
-from . import drawing, note_buttons, sharp_frame
+from . import drawing, sharp_frame
 from .drawing import Quad
-from .note_buttons import Button
+from .panel_parts import too_few_frames
 
 VIEWS = (
     ("RESULT", "Result", "The finished picture"),
@@ -61,57 +63,44 @@ def _redraw_when_still() -> float | None:
     return None
 
 
+_CHOSEN, _REDRAWN = {"update": _view_chosen}, {"update": preview_areas.redraw}
 Colors = Sequence[Sequence[float]]  # display values
+Say = Callable[[str], None]  # adds a note
 _NAVIGATION = 56  # interface units: Blender's navigation buttons at the right of a preview
 _TICK = 0.25  # seconds
 _STILL = 0.4  # seconds after which a frame counts as still
 _SOON = 0.1  # seconds
 
 
+@dataclass
+class _Settings:
+    live: bool = fields.switch("Live", "Show strokes and views of the effect in the preview", default=True)
+    view: str = fields.choice("View", "What the live preview shows", VIEWS, default="result", context=CONTEXT)
+    split: float = fields.fixed(
+        "Split Position",
+        "Border between source and result, as a fraction of the picture's width",
+        default=0.5,
+        subtype="FACTOR",
+    )
+    probe: bool = fields.switch("Probe", "Show the bars of the pixel under the pointer, and its share of each shutter")
+    probe_at: tuple[float, float] = fields.fixed(
+        "Probe Position",
+        "Position of the probe, as fractions of the picture from its lower left corner",
+        default=(-1.0, -1.0),
+        least=-1e3,
+        most=1e3,
+    )
+
+
+@with_fields(_Settings, live=_CHOSEN, view=_CHOSEN, split=_REDRAWN, probe=_REDRAWN, probe_at=_REDRAWN)
 class ShutterPreview(PropertyGroup):
     """Settings of the live preview, in the window manager: not saved, without undo."""
-
-    live: BoolProperty(
-        name="Live",
-        description="Show strokes and views of the effect in the preview",
-        default=True,
-        update=_view_chosen,
-    )
-    view: EnumProperty(
-        name="View",
-        description="What the live preview shows",
-        items=VIEWS,
-        update=_view_chosen,
-        translation_context=CONTEXT,
-    )
-    split: FloatProperty(
-        name="Split Position",
-        description="Border between source and result, as a fraction of the picture's width",
-        subtype="FACTOR",
-        default=0.5,
-        min=0.0,
-        max=1.0,
-        update=preview_areas.redraw,
-    )
-    probe: BoolProperty(
-        name="Probe",
-        description="Show the bars of the pixel under the pointer, and its share of each shutter",
-        update=preview_areas.redraw,
-    )
-    probe_at: FloatVectorProperty(
-        name="Probe Position",
-        description="Position of the probe, as fractions of the picture from its lower left corner",
-        size=2,
-        default=(-1.0, -1.0),
-        update=preview_areas.redraw,
-    )
 
 
 def _draw() -> None:
     """Draw over a preview. This is the draw handler."""
     context = bpy.context
     blender_gpu.free_unused()
-    note_buttons.clear(context.region)
     decision = previews.take_decision()
     if bpy.app.is_job_running("RENDER") or render_job.ends_films():
         return
@@ -131,7 +120,8 @@ def _draw() -> None:
         previews.looking.slices.end()
         previews.refine()
         return
-    say = _Notes(context.region)
+    notes: list[str] = []
+    say = notes.append
     if not context.window_manager.virtual_shutter.live:
         with suppress(*effect_source.FAULTS):  # no notes
             previews.refine()
@@ -146,11 +136,11 @@ def _draw() -> None:
         try:
             previews.refine()
         except effect_source.FAULTS as error:
-            _tell_fault(error, say)
-        say.draw()
+            say(rpt_("Shutter: {fault}").format(fault=error))
+        draw_notes(context.region, notes)
 
 
-def _show(context: Context, shown: Shown, decision: Decision | None, say: "_Notes") -> None:
+def _show(context: Context, shown: Shown, decision: Decision | None, say: Say) -> None:
     """Draw the effect, or a note why that is impossible.
 
     Args:
@@ -174,10 +164,10 @@ def _show(context: Context, shown: Shown, decision: Decision | None, say: "_Note
             main_thread.later(preview_areas.redraw)
     except effect_source.FAULTS as error:
         previews.looking.slices.end()
-        _tell_fault(error, say)
+        say(rpt_("Shutter: {fault}").format(fault=error))
 
 
-def _tell_unseen(context: Context, say: "_Notes") -> None:
+def _tell_unseen(context: Context, say: Say) -> None:
     """Add a note why the active effect is not visible, if no other effect is."""
     active = selection.active(context)
     if active is None or selection.seen(active[0]) or not context.space_data.show_overlays:
@@ -185,11 +175,11 @@ def _tell_unseen(context: Context, say: "_Notes") -> None:
     say(selection.why_unseen(active[0], active[2]))
 
 
-def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, say: "_Notes") -> None:
+def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, say: Say) -> None:
     settings, renderer, request = context.window_manager.virtual_shutter, wanted.renderer, wanted.request
     is_still = not context.screen.is_animation_playing
     if context.space_data.show_overlays:
-        _tell_detail(wanted, annotations.picture_size(shown.effect), is_still, say)
+        _tell_detail(wanted, annotations.picture_size(shown.effect), say)
     if wanted.left > 0 or wanted.draws_result:
         _warn(shown, say)
     if wanted.left > 0:
@@ -199,12 +189,12 @@ def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, s
         quad.draw("PICTURE", {"picture": texture}, wanted.left, 1.0, opacity=shown.strip.blend_alpha)
     colors = [shutter.color for shutter in shown.effect.shutters]
     if settings.view == "SCRIBBLES":
-        _show_scribbles(quad, colors, renderer.drawn_labels(request), renderer)
-    elif settings.view == "COEFFICIENTS":
-        _show_coefficients(quad, colors, renderer, request, "COEFFICIENTS", 0.75)
-    else:
-        if settings.view == "EDGES":
-            _show_coefficients(quad, colors, renderer, request, "EDGES", 1.0)
+        _show_shares(quad, "SCRIBBLES", colors, renderer.drawn_labels(request), renderer, 0.7)
+    elif settings.view in ("COEFFICIENTS", "EDGES"):
+        opacity, unit = 1.0 if settings.view == "EDGES" else 0.75, float(drawing.ui_scale())
+        drawn, count = renderer.drawn_with_layers(replace(request, quick=True)), len(request.state.bars)
+        _show_shares(quad, settings.view, colors, drawn, renderer, opacity, count=count, unit=unit)
+    if settings.view not in ("SCRIBBLES", "COEFFICIENTS"):
         _show_strokes(context, quad, shown, wanted.decision.snapshot)
     previews.looking.slices.end()
     _tell_carrying(say)
@@ -216,7 +206,7 @@ def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, s
         _tell_strobing(*strobing.look(shown.effect, decision.snapshot, renderer, decision.request), say)
 
 
-def _warn(shown: Shown, say: "_Notes") -> None:
+def _warn(shown: Shown, say: Say) -> None:
     """Add notes about what a picture drawn over the sequencer's cannot show."""
     if shown.strips_above:
         say(rpt_("The strips above are hidden in this view"))
@@ -224,15 +214,15 @@ def _warn(shown: Shown, say: "_Notes") -> None:
         say(rpt_("This view uses the view transform Standard"))
 
 
-def _tell_detail(wanted: Drawing, size: tuple[int, int], is_still: bool, say: "_Notes") -> None:
-    """Add a note about how the preview is less than a render, with the button for full quality.
+def _tell_detail(wanted: Drawing, size: tuple[int, int], say: Say) -> None:
+    """Add a note about how the preview is less than a render.
 
     Args:
         size: of the rendered picture.
     """
     source = wanted.renderer.source
     if previews.looking.whole is not None:
-        say(rpt_("Full quality: as it will be rendered"), ("shutter.full_quality", iface_("Back")))
+        say(rpt_("Full quality: as it will be rendered"))
         return
     less = []
     if source.width < size[0]:
@@ -242,14 +232,13 @@ def _tell_detail(wanted: Drawing, size: tuple[int, int], is_still: bool, say: "_
     if wanted.request is not wanted.decision.request:
         less.append(rpt_("draft edges"))
     if less:
-        button = ("shutter.full_quality", iface_("Full Quality")) if is_still else None
-        say(rpt_("Preview: {what}").format(what=", ".join(less)), button)
+        say(rpt_("Preview: {what}").format(what=", ".join(less)))
 
 
-def _tell_strobing(known: float | None, is_new: bool, say: "_Notes") -> None:
+def _tell_strobing(known: float | None, is_new: bool, say: Say) -> None:
     """Add a note about too few frames, as strobing.look returns it."""
     if known is not None:
-        say(*note_buttons.of_strobing(known))
+        say(too_few_frames(known))
     if is_new:
         main_thread.later(preview_areas.redraw_panels)  # panels may have been drawn before
     if strobing.is_busy():
@@ -266,21 +255,19 @@ def _measure() -> float | None:
 
 def _show_sharp(context: Context, shown: Shown | None) -> None:
     """Draw notes and strokes over the source frame."""
-    say = _Notes(context.region)
-    say(rpt_("Sharp frame to draw on: the result appears after the stroke"))
     with drawing.pixel_space(context.region), suppress(*effect_source.FAULTS):
-        say.draw()
+        draw_notes(context.region, [rpt_("Sharp frame to draw on: the result appears after the stroke")])
         if shown is not None and not previews.pen_is_down():
             quad = Quad(context.region, shown)
             snapshot = invalidation.current(shown.scene, shown.effect, shown.strip, shown.scene.frame_current)
             _show_strokes(context, quad, shown, snapshot)
 
 
-def _tell_carrying(say: "_Notes") -> None:
+def _tell_carrying(say: Say) -> None:
     """Track missing mattes of outlines, and add a note on the progress."""
     fault, progress = outline_carrying.begin(show_carried), outline_carrying.progress()
     if fault is not None:
-        _tell_fault(fault, say)
+        say(rpt_("Shutter: {fault}").format(fault=fault))
     if progress is not None:
         done, total = progress
         say(rpt_("Tracking the outline: {done} of {total} frames").format(done=done, total=total))
@@ -291,11 +278,6 @@ def show_carried() -> None:
     sessions.WINDOW.keep(set())
     invalidation.drop_frames()
     preview_areas.redraw()
-
-
-def _tell_fault(error: Exception | str, say: "_Notes") -> None:
-    """Add a note why there is no picture."""
-    say(rpt_("Shutter: {fault}").format(fault=error))
 
 
 def _show_strokes(context: Context, quad: Quad, shown: Shown, snapshot: Snapshot) -> None:
@@ -329,22 +311,13 @@ def _show_source(quad: Quad, shown: Shown, renderer: Renderer, request: Request,
     quad.draw("PICTURE", {"picture": texture}, 0.0, right, opacity=shown.strip.blend_alpha)
 
 
-def _show_scribbles(quad: Quad, colors: Colors, drawn: tuple[object, int], renderer: Renderer) -> None:
-    """Draw a picture of labels in their colors."""
-    labels, block = drawn
-    size = renderer.source.width, renderer.source.height
-    textures = {"labels": labels, "palette": _palette(colors)}
-    quad.draw("SCRIBBLES", textures, opacity=0.7, block=block, size=size)
-
-
-def _show_coefficients(
-    quad: Quad, colors: Colors, renderer: Renderer, request: Request, step: str, opacity: float
+def _show_shares(
+    quad: Quad, step: str, colors: Colors, drawn: tuple[Texture, int], renderer: Renderer, opacity: float, **more
 ) -> None:
-    coefficients, block = renderer.drawn_with_layers(replace(request, quick=True))
-    textures = {"coefficients": coefficients, "palette": _palette(colors)}
-    count, unit = len(request.state.bars), float(drawing.ui_scale())
-    size = renderer.source.width, renderer.source.height
-    quad.draw(step, textures, opacity=opacity, block=block, count=count, size=size, unit=unit)
+    """Draw a picture of labels or coefficients in their colors."""
+    (texture, block), source = drawn, renderer.source
+    textures = {"labels" if step == "SCRIBBLES" else "coefficients": texture, "palette": _palette(colors)}
+    quad.draw(step, textures, opacity=opacity, block=block, size=(source.width, source.height), **more)
 
 
 def _palette(palette: Colors) -> Texture:
@@ -356,48 +329,31 @@ def _palette(palette: Colors) -> Texture:
     return Texture(None, (*size, 1), "rgba32f", gpu.types.GPUTexture(size, layers=1, format="RGBA32F", data=data))
 
 
-class _Notes:
-    """Sentences at the upper left of a region, some with a button."""
-
-    def __init__(self, region: Region) -> None:
-        self._region = region
-        self._lines: list[tuple[str, Button | None]] = []
-
-    def __call__(self, sentence: str, button: Button | None = None) -> None:
-        """Add a sentence below the others."""
-        self._lines.append((sentence, button))
-
-    def draw(self) -> None:
-        unit = drawing.ui_scale()
-        y = self._region.height - 18 * unit
-        left, right = 16 * unit, self._region.width - _NAVIGATION * unit
-        high = (note_buttons.HEIGHT + 5) * unit
-        for sentence, button in self._lines:
-            lines = drawing.wrapped(sentence, right - left, drawing.SIZE)
-            for i, line in enumerate(lines):
-                y -= high if button and i + 1 == len(lines) else 18 * unit
-                drawing.plated(left, y, line)
-            if button is not None:
-                x = left + drawing.text_width(lines[-1]) + 10 * unit
-                if x + note_buttons.width(button) > right:  # no room beside it
-                    x, y = left, y - high
-                note_buttons.place(self._region, x, y - 6 * unit, button)
+def draw_notes(region: Region, notes: list[str]) -> None:
+    """Draw sentences at the upper left of a region."""
+    unit = drawing.ui_scale()
+    left, right = 16 * unit, region.width - _NAVIGATION * unit
+    lines = [line for note in notes for line in drawing.wrapped(note, right - left, drawing.SIZE)]
+    for i, line in enumerate(lines):
+        drawing.plated(left, region.height - (36 + 18 * i) * unit, line)
 
 
 classes = (ShutterPreview,)
-_handler = None
+
+
+@cache
+def _handler() -> object:
+    # After the sequencer's picture, before annotations and gizmos.
+    return bpy.types.SpaceSequenceEditor.draw_handler_add(_draw, (), "PREVIEW", "POST_VIEW")
 
 
 def register() -> None:
-    global _handler
     bpy.types.WindowManager.virtual_shutter = PointerProperty(type=ShutterPreview)
-    # After the sequencer's picture, before annotations and gizmos.
-    _handler = bpy.types.SpaceSequenceEditor.draw_handler_add(_draw, (), "PREVIEW", "POST_VIEW")
+    _handler()
 
 
 def unregister() -> None:
-    global _handler
-    bpy.types.SpaceSequenceEditor.draw_handler_remove(_handler, "PREVIEW")
-    _handler = None
+    bpy.types.SpaceSequenceEditor.draw_handler_remove(_handler(), "PREVIEW")
+    _handler.cache_clear()
     drawing.free()
     del bpy.types.WindowManager.virtual_shutter

@@ -1,11 +1,11 @@
 """Gizmos of the probe, which shows the shutter of a pixel, and of the handle of the split view."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import bpy
 import numpy as np
-from bpy.types import Context, Event, Gizmo, GizmoGroup, PropertyGroup, Region, Strip
+from bpy.types import Context, Event, Gizmo, GizmoGroup, PropertyGroup, Region
 
 from ...compute.renderer import Renderer
 from ...compute.request import Request
@@ -14,6 +14,7 @@ from ..data import annotations, preview_areas
 from ..devices import blender_gpu
 from ..rendering import effect_source, previews, sessions
 from . import drawing
+from .drawing import Box
 from .gizmo_groups import Dragged, InPreview, View, view
 
 _WIDTH, _HEIGHT, _LINE, _PAD, _APART = 180, 64, 17, 8, 14  # interface units
@@ -21,16 +22,8 @@ _REACH = 8  # interface units from the pointer to the split's handle
 _MARK = (1.0, 1.0, 1.0, 0.9)
 
 
-@dataclass(frozen=True)
-class Probed:
-    """A pixel's coefficients (N,), which sum to 1, and the bars (L,) of its shutter."""
-
-    coefficients: np.ndarray
-    bars: np.ndarray
-
-
-def probed_at(renderer: Renderer, request: Request, point: Sequence[float]) -> Probed | None:
-    """Return what a pixel is made of; None: the point is outside the picture.
+def probed_at(renderer: Renderer, request: Request, point: Sequence[float]) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return a pixel's coefficients (N,), which sum to 1, and the bars (L,) of its shutter; None: there is no pixel.
 
     It runs where Blender's GPU draws and reads one texel. Coefficients are solved only if something changed since they
     were drawn.
@@ -47,25 +40,11 @@ def probed_at(renderer: Renderer, request: Request, point: Sequence[float]) -> P
     values = np.maximum(values, 0).astype(np.float64)
     coefficients = values / values.sum()
     state = renderer.slid(request, known=True).state
-    return Probed(coefficients=coefficients, bars=compositor.mixed_shutter(state, coefficients))
+    return coefficients, compositor.mixed_shutter(state, coefficients)
 
 
-@dataclass(frozen=True)
-class Layout:
-    """Where the probe's box, bars and lines of text lie, in pixels of the region.
-
-    Attributes:
-        frame, bars: left, bottom, right, top.
-        lines: bottom of each line, from the top down.
-    """
-
-    frame: tuple[float, float, float, float]
-    bars: tuple[float, float, float, float]
-    lines: tuple[float, ...]
-
-
-def layout(point: Sequence[float], size: tuple[int, int], count: int, unit: float) -> Layout:
-    """Return the layout of the probe at a point of a region.
+def layout(point: Sequence[float], size: tuple[int, int], count: int, unit: float) -> tuple[Box, Box, list[float]]:
+    """Return the probe's box at a point of a region, the box of its bars, and the bottom of each line of text.
 
     The box lies at the lower right of the point, or on the other side if there is no room.
 
@@ -81,8 +60,8 @@ def layout(point: Sequence[float], size: tuple[int, int], count: int, unit: floa
     top = y - apart if y - apart - height >= 0 else y + apart + height
     left, top = max(left, 0.0), max(min(top, size[1]), height)
     bars = left + pad, top - pad - _HEIGHT * unit, left + width - pad, top - pad
-    lines = tuple(bars[1] - pad - (i + 1) * _LINE * unit for i in range(count))
-    return Layout((left, top - height, left + width, top), bars, lines)
+    lines = [bars[1] - pad - (i + 1) * _LINE * unit for i in range(count)]
+    return (left, top - height, left + width, top), bars, lines
 
 
 def _view(context: Context) -> View | None:
@@ -93,19 +72,12 @@ def _view(context: Context) -> View | None:
     return seen if annotations.is_invertible(seen.matrix) else None
 
 
-def _is_cropped(strip: Strip, size: tuple[int, int], point: Sequence[float]) -> bool:
-    crop, (x, y) = strip.crop, np.asarray(point) * size
-    return not (crop.min_x <= x < size[0] - crop.max_x and crop.min_y <= y < size[1] - crop.max_y)
-
-
 class SHUTTER_GT_probe(Gizmo):
     """The probe. It follows the pointer and lets clicks through."""
 
     def draw(self, context: Context) -> None:
         shown, at = preview_areas.shown(context), tuple(context.window_manager.virtual_shutter.probe_at)
         if shown is None or (seen := _view(context)) is None:
-            return
-        if _is_cropped(shown.strip, annotations.picture_size(shown.effect), at):
             return
         try:
             render = sessions.of_drawing()
@@ -115,7 +87,7 @@ class SHUTTER_GT_probe(Gizmo):
             return
         if probed is not None:
             (point,) = seen.on_region([at])
-            _draw(context.region, point, shown.effect.shutters, probed)
+            _draw(context.region, point, shown.effect.shutters, *probed)
 
     def test_select(self, context: Context, location: tuple[int, int]) -> int:
         """Follow the pointer: Blender calls this whenever it moves. No other callback leaves the events to others."""
@@ -125,21 +97,21 @@ class SHUTTER_GT_probe(Gizmo):
         return -1
 
 
-def _draw(region: Region, point: Sequence[float], shutters: Sequence[PropertyGroup], probed: Probed) -> None:
+def _draw(
+    region: Region, point: Sequence[float], shutters: Sequence[PropertyGroup], shares: np.ndarray, mixed: np.ndarray
+) -> None:
     unit = drawing.ui_scale()
-    place = layout(point, (region.width, region.height), len(shutters), unit)
+    frame, bars, lines = layout(point, (region.width, region.height), len(shutters), unit)
     colors = np.array([shutter.color for shutter in shutters])
     (x, y), arm = point, 6 * unit
     drawing.lines([(x - arm, y), (x + arm, y)], _MARK, width=1)
     drawing.lines([(x, y - arm), (x, y + arm)], _MARK, width=1)
-    drawing.rectangles([place.frame], [drawing.BACK])
-    shares = probed.bars / max(1.0, probed.bars.max())
-    drawing.bars(place.bars, shares, (*(probed.coefficients @ colors), 0.95))
-    left, _, right, _ = place.bars
-    for i, (bottom, shutter, share) in enumerate(zip(place.lines, shutters, probed.coefficients, strict=True)):
+    drawing.rectangles([frame], [drawing.BACK])
+    drawing.bars(bars, mixed / max(1.0, mixed.max()), (*(shares @ colors), 0.95))
+    left = bars[0]
+    for i, (bottom, shutter, share) in enumerate(zip(lines, shutters, shares, strict=True)):
         drawing.swatch(left, bottom - unit, 12 * unit, shutter, i)
-        drawing.text(left + 18 * unit, bottom, shutter.name, until=right - 44 * unit)
-        drawing.text(right - 38 * unit, bottom, f"{share:.1%}")
+        drawing.text(left + 18 * unit, bottom, f"{share:.1%}  {shutter.name}")
 
 
 class SHUTTER_GGT_probe(InPreview, GizmoGroup):
@@ -152,25 +124,21 @@ class SHUTTER_GGT_probe(InPreview, GizmoGroup):
 
 
 class SHUTTER_GT_split(Dragged, Gizmo):
-    def seen(self, context: Context) -> np.ndarray | None:
-        """Return the ends (2, 2) of the split line in pixels of the region."""
-        at = context.window_manager.virtual_shutter.split
-        return None if (seen := _view(context)) is None else seen.on_region([(at, 0.0), (at, 1.0)])
+    seen = staticmethod(_view)
 
-    def show(self, _context: Context, seen: np.ndarray) -> None:
-        x, y = seen.mean(axis=0)
+    def show(self, context: Context, seen: View) -> None:
+        at = context.window_manager.virtual_shutter.split
+        first, (x, y), last = seen.on_region([(at, 0.0), (at, 0.5), (at, 1.0)])
         half = drawing.ui_scale() * _REACH / 2
-        drawing.lines(seen, _MARK, width=2 if self.is_highlight else 1)
+        drawing.lines([first, last], _MARK, width=2 if self.is_highlight else 1)
         drawing.rectangles([(x - half, y - 3 * half, x + half, y + 3 * half)], [_MARK])
 
-    def is_at(self, _context: Context, seen: np.ndarray, location: tuple[int, int]) -> bool:
-        first, second = seen
-        along = (second - first) / max(np.hypot(*(second - first)), 1e-6)
-        offset = np.array(location) - first
-        apart, place = abs(along[0] * offset[1] - along[1] * offset[0]), along @ offset
-        return bool(apart <= drawing.ui_scale() * _REACH and 0 <= place <= np.hypot(*(second - first)))
+    def is_at(self, context: Context, seen: View, location: tuple[int, int]) -> bool:
+        x, y = seen.on_picture(*location)
+        apart = abs(x - context.window_manager.virtual_shutter.split) * np.hypot(*seen.matrix[:2, 0])
+        return bool(apart <= drawing.ui_scale() * _REACH and 0 <= y <= 1)
 
-    def grab(self, context: Context, _event: Event, _seen: np.ndarray) -> None:
+    def grab(self, context: Context, _event: Event, _seen: View) -> None:
         self.before = context.window_manager.virtual_shutter.split
 
     def drag(self, context: Context, event: Event, _tweak: set[str]) -> None:

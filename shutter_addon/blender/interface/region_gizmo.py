@@ -1,4 +1,4 @@
-"""Handles that move, rotate and scale the active region in the preview, and the operator that does it by numbers."""
+"""Handles that move, rotate and scale the active region in the preview."""
 
 from typing import NamedTuple
 
@@ -6,18 +6,17 @@ import bpy
 import numpy as np
 from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_iface as iface_
-from bpy.types import Context, Event, Gizmo, GizmoGroup, Operator, PropertyGroup, Scene, Strip
+from bpy.types import Context, Event, Gizmo, GizmoGroup, PropertyGroup, Scene, Strip
 
 from ...core import revision
 from ...core.messages import EffectError
 from ...core.model import scribbles
 from ..data import selection, snapshot, validation
-from ..data.properties import location_property, rotation_property, scale_property
 from ..editing import bar_edits, drawn_places, region_edits, track_region
 from ..editing.motion_keys import MotionKeys
-from . import drawing, needs
+from . import drawing
 from .gizmo_groups import TWEAK, Dragged, View, WithKeys, view
-from .operator_bases import OfEffect, popup
+from .operator_bases import popup
 
 _RADIUS = 7  # interface units: radius of a handle
 _NEAREST = 0.03  # fraction of the picture: least distance between the two handles
@@ -79,15 +78,6 @@ def place(context: Context) -> Place | None:
     return Place(centre, corner, seen_as)
 
 
-def outline(context: Context, where: Place) -> list[np.ndarray]:
-    """Return the active region's strokes (n, 2) by its properties, keyed or not, in pixels of the preview's region."""
-    scene, effect, strip = selection.active(context)
-    region = selection.active_region(effect)
-    numbers = region.location, np.degrees(region.rotation), region.scale
-    moved = scribbles.transform(_strokes_now(scene, effect, strip), *numbers, where.view.aspect)
-    return [where.view.on_region(points) for points in moved]
-
-
 class SHUTTER_GT_region(Dragged, Gizmo):
     """A handle of the active region: it moves the region, or, if `turns`, rotates and scales it."""
 
@@ -95,8 +85,12 @@ class SHUTTER_GT_region(Dragged, Gizmo):
 
     def show(self, context: Context, seen: Place) -> None:
         if self.is_modal:  # else the draw handler shows the keyed place
-            for points in outline(context, seen):
-                drawing.lines(points, _MARK, width=2)
+            scene, effect, strip = selection.active(context)
+            region = selection.active_region(effect)
+            numbers = region.location, np.degrees(region.rotation), region.scale
+            strokes = _strokes_now(scene, effect, strip)
+            for points in scribbles.transform(strokes, *numbers, seen.view.aspect):
+                drawing.lines(seen.view.on_region(points), _MARK, width=2)
         if not self.turns:
             drawing.lines([seen.centre, seen.corner], (1, 1, 1, 0.4))
         x, y = seen.corner if self.turns else seen.centre
@@ -153,29 +147,13 @@ class SHUTTER_GT_region(Dragged, Gizmo):
         if cancel:
             region.location, region.rotation, region.scale = self.before
             return
-        if wants_keys(context, effect, index):
-            _key(context, effect, index)
+        if bar_edits.auto_key(context) or MotionKeys(effect, index, region.motion).are_made():
+            try:
+                region_edits.key_region(effect, index)
+            except EffectError as error:  # gizmos have no reports
+                popup(context, str(error), icon="ERROR")
             context.area.tag_redraw()  # panels show whether it is keyed
         bpy.ops.ed.undo_push(message=iface_("Transform Region", contexts.operator_default))
-
-
-def wants_keys(context: Context, effect: PropertyGroup, index: int) -> bool:
-    """Return whether moving a region keys it: Auto Keying is on, or the region has keys from tracking."""
-    return bar_edits.auto_key(context) or MotionKeys(effect, index, effect.regions[index].motion).are_made()
-
-
-def _key(context: Context, effect: PropertyGroup, index: int) -> None:
-    """Key the region. Gizmos have no reports, so an error is a popup."""
-    try:
-        region_edits.key_region(effect, index)
-    except EffectError as error:
-        popup(context, str(error), icon="ERROR")
-
-
-def _is_drawing(context: Context) -> bool:
-    """Return whether the preview's tool draws or erases strokes."""
-    tool = context.workspace.tools.from_space_sequencer(context.space_data.view_type)
-    return tool is not None and tool.idname.startswith("builtin.annotate")
 
 
 class SHUTTER_GGT_region(WithKeys, GizmoGroup):
@@ -186,41 +164,11 @@ class SHUTTER_GGT_region(WithKeys, GizmoGroup):
     def poll(cls, context: Context) -> bool:
         settings, seen = context.window_manager.virtual_shutter, selection.in_picture(context)
         # A handle would take the pointer from the probe or from the pen.
-        if (settings.live and settings.probe) or _is_drawing(context):
+        tool = context.workspace.tools.from_space_sequencer(context.space_data.view_type)
+        if (settings.live and settings.probe) or (tool is not None and tool.idname.startswith("builtin.annotate")):
             return False
         return seen is not None and seen[0].is_editable and selection.active_region(seen[1]) is not None
 
     def setup(self, _context: Context) -> None:
         for turns in (False, True):
             self.gizmos.new(SHUTTER_GT_region.__name__).turns = turns
-
-
-class SHUTTER_OT_region_transform(OfEffect, Operator):
-    """Move, rotate and scale the active region by numbers, like its handles in the preview"""
-
-    bl_label = "Transform Region"
-    needs = (needs.a_region,)
-
-    location: location_property("Distance from where the region was drawn, as a fraction of the picture", step=1)
-    rotation: rotation_property("Rotation about the region's center")
-    scale: scale_property("Scale about the region's center")
-
-    def invoke(self, context: Context, _event: Event) -> set[str]:
-        region = selection.active_region(selection.active(context)[1])
-        self.location, self.rotation, self.scale = region.location, region.rotation, region.scale
-        return context.window_manager.invoke_props_dialog(self)
-
-    def draw(self, _context: Context) -> None:
-        layout = self.layout
-        layout.activate_init = True  # Blender ignores it with a property split or for a vector
-        layout.prop(self, "location", index=0, text="Location X")
-        layout.prop(self, "location", index=1, text="Location Y")
-        layout.prop(self, "rotation")
-        layout.prop(self, "scale")
-
-    def change(self, context: Context, effect: PropertyGroup) -> None:
-        index, region = effect.active_region, selection.active_region(effect)
-        drawn_places.hold(effect, index)
-        region.location, region.rotation, region.scale = self.location, self.rotation, self.scale
-        if wants_keys(context, effect, index):
-            region_edits.key_region(effect, index)

@@ -1,7 +1,5 @@
 """Panels of the active region and of the camera: mattes, transform and tracking."""
 
-import math
-
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.types import MovieTracking, PropertyGroup, Scene, Strip, UILayout
 
@@ -15,9 +13,9 @@ from .panel_parts import draw_list, draw_operators, draw_properties, sentence
 _PLACEMENT = "location", "rotation", "scale"
 _TRACKING = "motion", "track_until", "track_all_keys", "track_ends"
 _BUTTONS = {  # operators of each kind with drawings
-    "LINE": (("subject_find",), ("outline_it",)),
-    "OUTLINE": (("outline_it",), ("outline_needed",)),
-    "SUBJECT": (("subject_outline", "CURVE_BEZCIRCLE"), ("subject_scribble", "IPO_LINEAR")),
+    "LINE": ("subject_find", "outline_it"),
+    "OUTLINE": ("outline_it", "outline_needed"),
+    "SUBJECT": ("subject_outline", "subject_scribble"),
 }
 _OF_KIND = {"LINE": "width", "OUTLINE": "between", "RAMP": "ramp"}  # the property that only this kind has
 
@@ -79,7 +77,7 @@ def _draw_blend(layout: UILayout, region: PropertyGroup) -> None:
         row = layout.row()
         row.active = name != "blend" or not region.is_layer  # a layer covers all of them
         row.prop(region, name)
-    layout.operator("shutter.matte_export")
+    draw_operators(layout, "matte_export")
 
 
 def draw_tracking(layout: UILayout, index: int | None, is_subject: bool = False) -> None:
@@ -96,11 +94,11 @@ def draw_tracking(layout: UILayout, index: int | None, is_subject: bool = False)
 
 def tracking_icon(effect: PropertyGroup, index: int | None) -> str | None:
     """Return the icon of what `draw_tracked` draws; None: it draws nothing."""
-    stops = track_region.stops(effect, index)
-    if track_region.lost(effect, index) or any(is_fault for _, _, is_fault in stops):
+    faults = track_region.faults(effect, index)
+    if any(is_fault for _, _, is_fault in faults):
         return "ERROR"
     is_tracked = track_region.confidence_at(effect, index, effect.id_data.frame_current) is not None
-    return "INFO" if is_tracked or stops else None
+    return "INFO" if is_tracked or faults else None
 
 
 def draw_tracked(layout: UILayout, effect: PropertyGroup, index: int | None) -> None:
@@ -110,28 +108,12 @@ def draw_tracked(layout: UILayout, effect: PropertyGroup, index: int | None) -> 
     if confidence is not None:
         text = iface_("Confidence: {percent} %").format(percent=f"{100 * confidence:.0f}")
         layout.label(text=text, icon="CHECKMARK" if confidence >= SURE else "ERROR", translate=False)
-    if index is None:  # the gaps of a region begin at its stops, which are listed below
-        _draw_camera_gaps(layout, effect)
-    lost = track_region.lost(effect, index)
-    faults = [*([(*lost, True)] if lost else []), *track_region.stops(effect, index)]
-    for frame, reason, is_fault in faults:
+    for frame, reason, is_fault in track_region.faults(effect, index):
         row = layout.row(align=True)
         sentence(row, reason, "ERROR" if is_fault else "INFO", room=0.85)
         place = row.row()
         place.ui_units_x = 2.5
         place.operator(look, text=str(frame), translate=False).frame = frame
-
-
-def _draw_camera_gaps(layout: UILayout, effect: PropertyGroup) -> None:
-    """Draw the frame ranges without a camera track."""
-    for gap in track_region.gaps(effect, None):
-        if math.isinf(gap.last):
-            text = iface_("Not tracked: from frame {first} on")
-        elif math.isinf(gap.first):
-            text = iface_("Not tracked: up to frame {last}")
-        else:
-            text = iface_("Not tracked: frames {first} to {last}")
-        sentence(layout, text.format(first=gap.first, last=gap.last), "INFO")
 
 
 def has_strokes(effect: PropertyGroup) -> bool:
@@ -156,7 +138,7 @@ def draw_follow(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: 
     draw_properties(layout, region, "follow_clip", "follow_kind")
     if region.follow_clip is not None:
         _draw_tracks(layout, region, region.follow_clip.tracking)
-    layout.operator("shutter.follow", icon="TRACKER")
+    draw_operators(layout, "follow")
 
 
 def _draw_tracks(layout: UILayout, region: PropertyGroup, tracking: MovieTracking) -> None:

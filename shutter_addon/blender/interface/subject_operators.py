@@ -12,29 +12,29 @@ from ..data import consistency, selection
 from ..editing import subjects
 from ..rendering.effect_source import FAULTS
 from . import needs
-from .operator_bases import operator, popup, redraw, report_warning
+from .operator_bases import operator, popup, redraw, report
 
 
 @operator("Find Subject", needs.strokes, only_seen=True)
 def subject_find(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
     """Make the active region a subject, which a model finds under its strokes at this frame and follows"""
     if not subjects.find(self.edit, effect, self.effect_strip, effect.active_region):
-        report_warning(self, rpt_("The model finds no subject under the stroke: draw along its middle, or outline it"))
+        report(self, rpt_("The model finds no subject under the stroke: draw along its middle, or outline it"))
         return {"CANCELLED"}
     return None
 
 
-@operator("Scribble", needs.a_subject)
+@operator("Scribble", needs.a_subject, icon="IPO_LINEAR")
 def subject_scribble(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Make the active subject a scribble: its strokes, as wide as the region's width"""
     effect.regions[effect.active_region].kind = "LINE"
 
 
-@operator("Outline", needs.a_subject, only_seen=True)
+@operator("Outline", needs.a_subject, icon="CURVE_BEZCIRCLE", only_seen=True)
 def subject_outline(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
     """Make the active subject an outline, which is drawn where the subject has strokes"""
     if not subjects.to_outline(self.edit, effect, self.effect_strip, effect.active_region):
-        report_warning(self, rpt_("The subject has no outline there"))
+        report(self, rpt_("The subject has no outline there"))
         return {"CANCELLED"}
     return None
 

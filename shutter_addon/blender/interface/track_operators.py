@@ -12,7 +12,7 @@ from ..data import selection, validation
 from ..editing import bar_edits, follow_track, outline_drawings, shutter_edits, track_region
 from ..rendering.effect_source import FAULTS
 from . import needs
-from .operator_bases import Beside, OfEffect, operator, redraw, report_warning, show_status
+from .operator_bases import Beside, OfEffect, given, operator, redraw, report, show_status
 
 # Seconds: work between two redraws, at least and at most; waiting for the tracking thread.
 _TICK, _MOST, _PATIENCE = 0.05, 0.1, 0.02
@@ -24,13 +24,12 @@ DIRECTIONS = (
 )
 
 
-# SKIP_SAVE: Blender would otherwise reuse the direction of the last button.
-_DIRECTION = EnumProperty(
-    name="Direction",
-    description="Direction of tracking from the current frame",
+_DIRECTION = given(
+    EnumProperty,
+    "Direction",
+    "Direction of tracking from the current frame",
     items=DIRECTIONS,
     default="BOTH",
-    options={"SKIP_SAVE"},
     translation_context=CONTEXT,
 )
 
@@ -67,7 +66,6 @@ class _Tracks(Beside):
         self._steps = track_region.track(scene, effect, strip, index, self._frames, motion, **options)
         if not self._track(math.inf if waits else _TICK):
             return self._finish(context)
-        context.window_manager.progress_begin(0, len(self._frames))
         self._show(context)
         return self.go_on(context)
 
@@ -96,7 +94,6 @@ class _Tracks(Beside):
 
     def leave(self, context: Context) -> None:
         self._steps.close()
-        context.window_manager.progress_end()
         super().leave(context)
 
     def _track(self, seconds: float) -> bool:
@@ -116,7 +113,7 @@ class _Tracks(Beside):
         except FAULTS as error:
             if not self._done:
                 raise
-            report_warning(self, str(error))
+            report(self, str(error))
         return False
 
     def _go_to(self, frame: int) -> None:
@@ -126,7 +123,6 @@ class _Tracks(Beside):
     def _show(self, context: Context) -> None:
         self._go_to(self._frame)
         done, total = len(self._done), len(self._frames) - 1
-        context.window_manager.progress_update(done)
         show_status(rpt_("Tracking: {done} of {total} frames, Esc to stop").format(done=done, total=total))
         redraw(context)
         self._shown = time.perf_counter()
@@ -139,13 +135,13 @@ class _Tracks(Beside):
         self.report({"INFO"}, sentence.format(first=first, last=last))
         lost = track_region.lost(effect, self._target.index)
         if lost and lost[0] in self._frames:
-            report_warning(self, lost[1])
+            report(self, lost[1])
             return
         for frame, fault, is_fault in track_region.stops(effect, self._target.index):
             if frame in self._frames:
                 words = rpt_("Tracking stopped at frame {frame}: {fault}").format(frame=frame, fault=fault)
                 if is_fault:
-                    report_warning(self, words)
+                    report(self, words)
                 else:
                     self.report({"INFO"}, words)
 
@@ -154,6 +150,7 @@ class SHUTTER_OT_track(_Tracks, OfEffect, Operator):
     """Track what the active region covers here, up to your own keyframes (Esc stops and keeps the tracked frames)"""
 
     bl_label = "Track Region"
+    choices = "direction"
     needs = (needs.strokes,)
 
     direction: _DIRECTION
@@ -163,6 +160,7 @@ class SHUTTER_OT_track_camera(_Tracks, OfEffect, Operator):
     """Track the camera outside the regions, up to your own keyframes (Esc stops and keeps the tracked frames)"""
 
     bl_label = "Track Camera"
+    choices = "direction"
     is_camera = True
 
     direction: _DIRECTION
@@ -185,6 +183,7 @@ class SHUTTER_OT_tripod(_Tracks, OfEffect, Operator):
 
     bl_label = "Stabilize Exposure"
     needs = (needs.a_shutter,)
+    icon = "CON_CAMERASOLVER"
     is_camera = True
     direction = "BOTH"
     once = True
@@ -193,11 +192,7 @@ class SHUTTER_OT_tripod(_Tracks, OfEffect, Operator):
         shutter_edits.tripod(self._target.effect(), bar_edits.auto_key(context))
 
 
-_FRAME = IntProperty(
-    name="Frame",
-    description="Timeline frame; without one, the least confident of the next unsure frames",
-    options={"SKIP_SAVE"},
-)
+_FRAME = given(IntProperty, "Frame", "Timeline frame; without one, the least confident of the next unsure frames")
 
 
 def _look(looking: Operator, effect: PropertyGroup, index: int | None) -> set[str] | None:
@@ -232,7 +227,7 @@ def _why_no_clip(effect: PropertyGroup) -> str | None:
     return None if has_clip else rpt_("Choose a clip first")
 
 
-@operator("Follow Track", needs.strokes, _why_no_clip)
+@operator("Follow Track", needs.strokes, _why_no_clip, icon="TRACKER")
 def follow(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Key the active region by a track of a movie clip, from its place at this frame"""
     follow_track.follow(self.edit, effect, self.effect_strip, effect.active_region)

@@ -210,8 +210,6 @@ MESSAGES = {
     ("*", "Remove the active shutter and its regions"): "Den aktiven Verschluss und seine Regionen entfernen",
     ("*", "The last shutter of an effect cannot be removed"): "Der letzte Verschluss eines Effekts bleibt",
     ("Operator", "Move Shutter"): "Verschluss verschieben",
-    ("Operator", "Move Up"): "Nach oben",
-    ("Operator", "Move Down"): "Nach unten",
     (
         "*",
         "Move the active shutter in the list (the first one is the default, used where nothing is drawn)",
@@ -301,7 +299,6 @@ MESSAGES = {
     ("*", "No bar has a keyframe at the current frame"): "Kein Balken hat beim aktuellen Bild ein Schlüsselbild",
     ("Operator", "Set Bar Weight"): "Balkengewicht setzen",
     ("*", "Set the weight of a bar as a number"): "Das Gewicht eines Balkens als Zahl setzen",
-    ("*", "Bar {number}"): "Balken {number}",
     ("*", "Bar"): "Balken",
     ("*", "Number of the bar, from 1"): "Nummer des Balkens, ab 1",
     ("*", "Weight"): "Gewicht",
@@ -540,12 +537,6 @@ MESSAGES = {
     ("*", "Rotation"): "Rotation",
     ("*", "Rotation about the region's center"): "Rotation um die Mitte der Region",
     ("Operator", "Transform Region"): "Region transformieren",
-    ("*", "Location X"): "Position X",
-    ("*", "Location Y"): "Position Y",
-    (
-        "*",
-        "Move, rotate and scale the active region by numbers, like its handles in the preview",
-    ): "Die aktive Region durch Zahlen bewegen, drehen und skalieren, wie es ihre Griffe in der Vorschau tun",
     ("*", "Scale"): "Skalieren",
     ("*", "Scale about the region's center"): "Skalierung um die Mitte der Region",
     # Mattes and ramps
@@ -972,15 +963,12 @@ MESSAGES = {
     ("*", "from a proxy"): "aus einem Proxy",
     ("*", "draft edges"): "Kanten im Entwurf",
     ("*", "Full quality: as it will be rendered"): "Volle Qualität, wie es gerendert wird",
-    ("*", "Back"): "Zurück",
-    ("*", "Full Quality"): "Volle Qualität",
     ("Operator", "Full Quality"): "Volle Qualität",
     (
         "*",
         "Show this frame exactly as it will be rendered, at one screen pixel per pixel; click again to end",
     ): "Dieses Bild zeigen, wie es gerendert wird, jedes seiner Pixel auf einem des Schirms, oder das beenden",
     ("*", "No preview shows a Shutter strip"): "Keine Vorschau zeigt einen Verschlussstreifen",
-    ("*", "Buttons of Notes"): "Knöpfe an Hinweisen",
     ("*", "Composing…"): "Wird berechnet …",
     ("*", "The strips above are hidden in this view"): "Die Streifen darüber sind in dieser Ansicht verborgen",
     ("*", "This view uses the view transform Standard"): "Diese Ansicht hat die Anzeigetransformation Standard",
@@ -1085,9 +1073,6 @@ MESSAGES = {
         "*",
         "the picture is too unlike those before; tracking goes on from here",
     ): "das Bild ist denen davor zu unähnlich; von hier aus geht die Verfolgung weiter",
-    ("*", "Not tracked: from frame {first} on"): "Nicht verfolgt: ab Bild {first}",
-    ("*", "Not tracked: up to frame {last}"): "Nicht verfolgt: bis Bild {last}",
-    ("*", "Not tracked: frames {first} to {last}"): "Nicht verfolgt: Bilder {first} bis {last}",
     ("*", "Fade Out When Lost"): "Ausblenden, wenn verloren",
     (
         "*",
@@ -1353,7 +1338,6 @@ MESSAGES = {
     ): "der Strip, der gebacken wurde, ist nicht mehr da; sein Film ist „{path}“",
     # Reports
     ("Operator", "Copy Report"): "Bericht kopieren",
-    ("*", "Report"): "Bericht",
     (
         "*",
         "Copy versions, device, types and numbers of the edit, and last errors: no names, no paths. Nothing is sent",
@@ -1361,8 +1345,6 @@ MESSAGES = {
     "Nichts wird gesendet",
     ("*", "Report copied: paste it into your message and read it before you send it"): "Bericht kopiert: "
     "in die Nachricht einfügen, und vor dem Senden lesen",
-    ("*", "Without a window there is no clipboard: use the command check with --report"): "Ohne Fenster gibt es keine "
-    "Zwischenablage: der Befehl check mit --report gibt den Bericht aus",
     # Devices
     ("Virtual Shutter", "Render Device"): "Rendergerät",
     (
