@@ -1,7 +1,5 @@
 """The command `render`: a film of a source and a recipe, or of a saved edit, through Blender's sequencer."""
 
-from __future__ import annotations
-
 import argparse
 from argparse import Namespace
 from pathlib import Path
@@ -91,11 +89,10 @@ def _render_source(arguments: Namespace) -> None:
         film_output.set_output(scene, output, file_format, alpha=medium.alpha != "opaque")
     if arguments.save:
         _save(scene, arguments.save)
-    weights = arguments.weights if output else None
-    with render_settings.using(arguments.device, weights, arguments.gpu_memory):
-        if output and arguments.weights:
-            film_output.make_folder(arguments.weights)
-        if output:
+    if output and arguments.weights:
+        film_output.make_folder(arguments.weights)
+    if output:
+        with render_settings.using(arguments.device, arguments.weights, arguments.gpu_memory):
             film_output.render_made_edit(scene, output)
 
 

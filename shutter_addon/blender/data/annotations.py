@@ -1,7 +1,5 @@
 """Scribbles: annotation layers and strokes, and the transform between an effect's picture and the sequencer's image."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import bpy

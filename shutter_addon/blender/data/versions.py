@@ -1,7 +1,5 @@
 """The versions of the extension, of Blender, and of the open edit."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import tomllib
@@ -44,26 +42,14 @@ def colours() -> str:
     if path.startswith("ocio://"):
         return path
     own = Path(bpy.utils.system_resource("DATAFILES", path="colormanagement"), "config.ocio")
-    digest = _config_digest(Path(path))
-    return "" if digest == _config_digest(own) else digest
-
-
-def _config_digest(path: Path) -> str:
-    """Return the digest of a file, or "" if it is missing: Blender then takes its own."""
-    try:
-        return _sha256(path)
-    except OSError:
-        return ""
-
-
-def _sha256(path: str | Path) -> str:
-    with open(path, "rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+    digest = _digest(Path(path), derived.WHOLE)  # None for a missing one: Blender then takes its own
+    return "" if digest in (None, _digest(own, derived.WHOLE)) else digest.hex()
 
 
 def of_edit(scene: Scene) -> EditVersion:
     """Return the version of the edit in the open .blend file. OSError: the file is gone."""
-    blend = _sha256(bpy.data.filepath)
+    with open(bpy.data.filepath, "rb") as file:
+        blend = hashlib.file_digest(file, "sha256").hexdigest()
     footage = hashlib.sha256()
     for files in _footage_files(scene):
         different = [path for path, _ in groupby(files)]  # a still that is held counts once
