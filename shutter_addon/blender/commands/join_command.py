@@ -1,7 +1,5 @@
 """The command `join`: a movie of rendered frames, with the edit's sound."""
 
-from __future__ import annotations
-
 import argparse
 from argparse import Namespace
 

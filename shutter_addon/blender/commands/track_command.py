@@ -1,7 +1,5 @@
 """The command `track`: keys for a region of a recipe, which follows what it covers, or for the camera."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from argparse import Namespace
