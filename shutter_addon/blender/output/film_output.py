@@ -216,13 +216,14 @@ def render_frames(scene: Scene, output: Path, moved: Callable[[], None], move: M
     Raises:
         OutputError, InterruptedRenderError: See `render_made_edit`.
     """
-    kept = scene.render.filepath
+    is_film = is_movie(output)
     faults: list[str] = []
-    with atomic_write.part_folder(output.parent if is_movie(output) else output) as part:
+    with atomic_write.part_folder(output.parent if is_film else output) as part:
         part_film = part / f"film{output.suffix}"
+        place = blender_path(str(part_film) if is_film else f"{part}{os.sep}")
         try:
-            scene.render.filepath = blender_path(str(part_film) if is_movie(output) else f"{part}{os.sep}")
             with (
+                for_a_while([(scene.render, "filepath", place)]),
                 render_job.telling(faults.append),
                 stoppable() as stopped,
                 quiet(),
@@ -231,22 +232,20 @@ def render_frames(scene: Scene, output: Path, moved: Callable[[], None], move: M
                 _moved(part, output, scene, moved, move) as missing,
             ):
                 bpy.ops.render.render(animation=True, scene=scene.name)
-            if is_movie(output) and not faults and not stopped:
-                count = len(range(scene.frame_start, scene.frame_end + 1, scene.frame_step))
-                if not is_whole_movie(part_film, count):
-                    raise OutputError(f"{output}: could not be written whole ({why_short(part)})")
-                part_film.replace(output)
-            elif missing and not faults and not stopped:
-                raise OutputError(f"{output}: {len(missing)} frames were not written; {why_short(part)}")
         except RuntimeError as error:
             raise OutputError(f"{output}: {message(error)}") from None
-        finally:
-            scene.render.filepath = kept
-        if faults or stopped:
-            rescued = _rescued(part_film, output) if is_movie(output) else ""
-            if faults:
-                raise OutputError(faults[0] + rescued)
+        rescued = _rescued(part_film, output) if is_film and (faults or stopped) else ""
+        if faults:
+            raise OutputError(faults[0] + rescued)
+        if stopped:
             raise InterruptedRenderError(f"{output}: stopped{rescued}")
+        if missing:
+            raise OutputError(f"{output}: {len(missing)} frames were not written; {why_short(part)}")
+        if is_film:
+            count = len(range(scene.frame_start, scene.frame_end + 1, scene.frame_step))
+            if not is_whole_movie(part_film, count):
+                raise OutputError(f"{output}: could not be written whole ({why_short(part)})")
+            part_film.replace(output)
 
 
 def make_folder(folder: Path) -> None:
