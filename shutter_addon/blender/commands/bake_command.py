@@ -13,12 +13,11 @@ from ..data import strips
 from ..editing import whole_edits
 from ..output import baked_film, film_output
 from . import command_line
-from .command_line import to_path
 
 
 def add(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser("bake", help="render one effect of a saved edit, for a strip to show")
-    option = parser.add_argument
+    option, to_path = parser.add_argument, command_line.to_path
     option("source", type=to_path, help="a saved edit (.blend)")
     option("--strip", required=True, metavar="NAME", help="its effect strip")
     option("--scene", metavar="NAME", help="the strip's scene (default: the active one)")

@@ -18,12 +18,11 @@ from ..devices import available
 from ..output import edit_check, error_report, film_join, film_output, shared_frames
 from ..rendering import render_job, render_settings
 from . import command_line
-from .command_line import to_path
 
 
 def add(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser("check", help="find out whether an edit can be rendered here")
-    option = parser.add_argument
+    option, to_path = parser.add_argument, command_line.to_path
     option("edit", metavar="FILE.blend", type=to_path, help="a saved edit")
     option("--frames", metavar="A:B", help="timeline frames A to B (default: all of the edit)")
     option("--output", type=to_path, metavar="DIR", help="folder for the frames; it gets the job's file")

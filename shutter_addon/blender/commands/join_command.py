@@ -7,12 +7,11 @@ from ...core.farm import job_file
 from ..data import external_files, versions
 from ..output import film_join, film_output
 from . import command_line
-from .command_line import to_path
 
 
 def add(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser("join", help="make a movie of rendered frames, with the edit's sound and settings")
-    option = parser.add_argument
+    option, to_path = parser.add_argument, command_line.to_path
     option("folder", metavar="FRAMES", type=to_path, help="the folder of the frames")
     option("--edit", type=to_path, required=True, metavar="FILE.blend", help="the edit that they were rendered from")
     option("--output", type=to_path, required=True, help=f"a movie ({', '.join(film_output.MOVIES)})")

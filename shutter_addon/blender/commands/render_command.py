@@ -19,12 +19,11 @@ from ..editing import whole_edits
 from ..output import film_output, shared_frames
 from ..rendering import render_settings
 from . import command_line
-from .command_line import to_path
 
 
 def add(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser("render", help="render a source through a recipe, or a saved edit")
-    option = parser.add_argument
+    option, to_path = parser.add_argument, command_line.to_path
     option("source", type=to_path, help="a movie, the first file of an image sequence, or a saved edit (.blend)")
     option("--recipe", type=to_path, help="the effect, a JSON file; not for a saved edit")
     option("--output", type=to_path, help=f"a folder, or a movie ({', '.join(film_output.MOVIES)})")

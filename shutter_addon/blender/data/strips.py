@@ -61,13 +61,14 @@ def shown_scenes(scene: Scene) -> list:
 
 def own_strips(scene: Scene) -> list[Strip]:
     """Return the strips that were made for effects, even if their scene has another engine or was deleted."""
-    known = [(strip, strip.scene, strip.virtual_shutter_effect) for strip in all_strips(scene) if strip.type == "SCENE"]
-    return [
-        strip
-        for strip, shown, identity in known
-        if (shown and shown.render.engine == ENGINE)
-        or (identity and (shown is None or shown.virtual_shutter.identity == identity))
-    ]
+    return [strip for strip in all_strips(scene) if strip.type == "SCENE" and _is_own(strip)]
+
+
+def _is_own(strip: Strip) -> bool:
+    scene, identity = strip.scene, strip.virtual_shutter_effect
+    if scene is None:
+        return identity != ""
+    return scene.render.engine == ENGINE or scene.virtual_shutter.identity == identity != ""
 
 
 def effect_of(scene: Scene, effect_scene: Scene) -> Any:
