@@ -8,7 +8,6 @@ from pathlib import Path
 
 from bpy.types import PropertyGroup, Scene, Strip
 
-from ...compute.renderer import Renderer
 from ...compute.request import Request
 from ...core.frames import frame_ranges
 from ...core.frames.frame_source import FrameSource
@@ -80,7 +79,9 @@ def _notes(session: RenderSession, folders: set[Path], taken: snapshot.Snapshot)
     context = RenderContext(session)
     requests = [session.request(taken, frame, context) for frame in sorted(taken.frames)]
     renderer = session.renderer(requests[0].source)
-    _check_frames(renderer, requests)
+    # All files of image sequences that windows need, and the first and last frame of a movie.
+    step, needed = renderer.source.step, set[int]().union(*map(renderer.missing, requests))
+    _check_readable(renderer.source, {end for index in needed for end in (index // step, -(-index // step))}, step)
     lacking = _lacking_mattes(renderer.source, requests, folders)
     notes = list(dict.fromkeys(note for request in requests for note in pictures.unread(taken, request)))
     if renderer.source.by_blender:
@@ -107,13 +108,6 @@ def _check_footage(scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
         if not timing.keys and medium.count < int(source.content_duration * rate):
             words = f"{medium.count} frames, fewer than the {source.content_duration} of strip"
             raise OutputError(f'{medium.path.name}: has {words} "{source.name}"')
-
-
-def _check_frames(renderer: Renderer, requests: list[Request]) -> None:
-    """Check the files that windows need: all of image sequences, and the first and last frame of a movie."""
-    step = renderer.source.step
-    needed: set[int] = set().union(*map(renderer.missing, requests))
-    _check_readable(renderer.source, {end for index in needed for end in (index // step, -(-index // step))}, step)
 
 
 def _check_readable(source: FrameSource, indices: set[int], step: int = 1) -> None:

@@ -51,26 +51,24 @@ class _Film:
     has_begun: bool = False
 
 
-_running: list[_Film] = []  # at most one
-
-
 def begin(scene: Scene) -> None:
     """Begin the render of an edit, on the main thread."""
     end()
     if render_job.where() is Where.BACKGROUND and scene.sequence_editor is not None:
-        _running.append(_Film(scene.session_uid))
+        job_snapshots.running.feed = _Film(scene.session_uid)
 
 
 def end() -> None:
     """Restore the edit."""
-    while _running:
-        _running.pop().changed.close()
+    film, job_snapshots.running.feed = job_snapshots.running.feed, None
+    if film is not None:
+        film.changed.close()
 
 
 def before_frame(scene: Scene) -> None:
     """Prepare the edit for its current frame."""
-    film = next((film for film in _running if film.scene == scene.session_uid), None)
-    if film is None:
+    film = job_snapshots.running.feed
+    if film is None or film.scene != scene.session_uid:
         return
     if not film.has_begun:  # a single picture can be saved as floats later
         film.has_begun = True

@@ -27,8 +27,7 @@ def check(folder: Path, file_format: str | None, frames: range, read: list[Path]
         read: Files that must not be overwritten.
     """
     if film_output.is_movie(folder):
-        words = "a saved edit is rendered to a folder of pictures, not to a movie"
-        raise film_output.OutputError(f"{folder}: {words}")
+        raise film_output.OutputError(f"{folder}: a saved edit is rendered to a folder of pictures, not to a movie")
     film_output.check_folder(folder, file_format)
     film_output.blender_path(str(folder))
     film_output.refuse_overwriting(film_output.pictures_of(folder, file_format or "png", frames), read)
@@ -37,8 +36,8 @@ def check(folder: Path, file_format: str | None, frames: range, read: list[Path]
 def check_resumable(scene: Scene) -> None:
     """Raise OutputError if pictures cannot carry the edit's version."""
     if scene.render.use_stamp:
-        words = "the edit burns metadata into its pictures, so that they carry no version; turn Burn Into Image off"
-        raise film_output.OutputError(f"--resume: {words}")
+        why = "the edit burns metadata into its pictures, so that they carry no version; turn Burn Into Image off"
+        raise film_output.OutputError(f"--resume: {why}")
 
 
 def render(scene: Scene, folder: Path, file_format: str, version: EditVersion, *, resume: bool) -> None:
