@@ -97,7 +97,7 @@ def _setting_faults(arguments: Namespace, scene: Scene, frames: range) -> list[s
     if arguments.output:
         faults += _fault(shared_frames.check, arguments.output, arguments.format, frames, read)
     if arguments.movie:
-        faults += _fault(film_join.check, arguments.movie, [*read, *versions.sounds()])
+        faults += _fault(film_join.check, arguments.movie, read)
     is_movie = arguments.movie or scene.render.image_settings.media_type == "VIDEO"
     film = arguments.movie or Path("film.mp4" if is_movie else "frames")
     return faults or _fault(film_output.check, film, None, film_output.size(scene))

@@ -21,7 +21,7 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 def run(arguments: Namespace) -> None:
     scene, frames = command_line.open_edit(arguments.edit, arguments.frames)
-    film_join.check(arguments.output, [arguments.edit, *versions.read_files(scene), *versions.sounds()])
+    film_join.check(arguments.output, [arguments.edit, *versions.read_files(scene)])
     for fault in external_files.sound_faults(scene, frames):
         raise film_output.OutputError(fault)  # Blender would make a silent film
     version = versions.of_edit(scene)

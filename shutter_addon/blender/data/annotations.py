@@ -114,12 +114,6 @@ def layers_of(effect: PropertyGroup, region: PropertyGroup) -> list:
     return [layer for name in LAYERS if (layer := layer_of(effect, region, name)) is not None]
 
 
-def is_hidden(effect: PropertyGroup, region: PropertyGroup) -> bool:
-    """Tell whether the user has hidden a region's lines."""
-    layer = layer_of(effect, region)
-    return layer is not None and layer.annotation_hide
-
-
 def annotation(effect: PropertyGroup) -> Annotation:
     """Return the annotation of the effect's scribbles, made again where it was removed."""
     if effect.scene.annotation is None:

@@ -93,7 +93,8 @@ def shown(context: Context, channel: int = 0) -> Shown | None:
     _, effect, strip = seen
     above = any(other.channel > strip.channel for other in selection.visible(scene))
     drawn = [region for region in strips.used_regions(effect) if region.kind not in strips.MATTES]
-    hidden = tuple(annotations.is_hidden(effect, region) for region in drawn)
+    layers = [annotations.layer_of(effect, region) for region in drawn]
+    hidden = tuple(layer is not None and layer.annotation_hide for layer in layers)
     return Shown(scene=scene, effect=effect, strip=strip, strips_above=above, hides_strokes=hidden)
 
 

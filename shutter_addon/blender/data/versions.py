@@ -27,11 +27,6 @@ def extension() -> str:
     return tomllib.loads(MANIFEST.read_text(encoding="utf-8"))["version"]
 
 
-def blender() -> str:
-    """Return Blender's major, minor and micro version."""
-    return ".".join(map(str, bpy.app.version))
-
-
 def colours() -> str:
     """Return an identifier of Blender's OpenColorIO configuration; "": Blender's own, wherever it is installed.
 
@@ -55,17 +50,13 @@ def of_edit(scene: Scene) -> EditVersion:
         different = [path for path, _ in groupby(files)]  # a still that is held counts once
         for path, digest in zip(different, digests(different), strict=True):
             footage.update(digest or b"missing: " + os.fsencode(path.name))
-    return EditVersion(extension(), blender(), colours(), blend, footage.hexdigest())
+    return EditVersion(extension(), ".".join(map(str, bpy.app.version)), colours(), blend, footage.hexdigest())
 
 
 def read_files(scene: Scene) -> list[Path]:
-    """Return all files that the edit's pictures are made from, except the .blend file."""
-    return [path for files in _footage_files(scene) for path in files]
-
-
-def sounds() -> list[Path]:
-    """Return the files of all sounds."""
-    return [path for sound in bpy.data.sounds for path in external_files.named(sound)]
+    """Return all files that the edit is made from, except the .blend file: those of pictures, and of all sounds."""
+    sounds = map(external_files.named, bpy.data.sounds)
+    return [path for files in (*_footage_files(scene), *sounds) for path in files]
 
 
 def _footage_files(scene: Scene) -> Iterator[list[Path]]:
