@@ -1,7 +1,6 @@
 """Checks of written files: whether they are complete, since Blender does not always report a full disk; and which edit
 a rendered picture belongs to."""
 
-import os
 import struct
 import zlib
 from contextlib import closing, suppress
@@ -64,16 +63,6 @@ def read(path: Path, edit: str | None = None) -> RenderedPicture | None:
         return None
     finally:
         image.close()
-
-
-def stamp(path: Path) -> tuple[int, int, int] | None:
-    """Return a value that changes when a picture is replaced, or None. Opening it makes network drives look again."""
-    try:
-        with path.open("rb") as file:
-            status = os.fstat(file.fileno())
-            return status.st_ino, status.st_size, status.st_mtime_ns
-    except OSError:
-        return None
 
 
 def is_transparent(path: Path) -> bool:

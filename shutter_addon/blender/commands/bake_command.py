@@ -1,8 +1,7 @@
 """The command `bake`: the film of one effect of a saved edit, which an ordinary strip shows."""
 
-from __future__ import annotations
-
 import argparse
+import itertools
 import os
 from argparse import Namespace
 from contextlib import suppress
@@ -14,12 +13,11 @@ from ..data import strips
 from ..editing import whole_edits
 from ..output import baked_film, film_output
 from . import command_line
-from .command_line import to_path
 
 
 def add(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser("bake", help="render one effect of a saved edit, for a strip to show")
-    option = parser.add_argument
+    option, to_path = parser.add_argument, command_line.to_path
     option("source", type=to_path, help="a saved edit (.blend)")
     option("--strip", required=True, metavar="NAME", help="its effect strip")
     option("--scene", metavar="NAME", help="the strip's scene (default: the active one)")
@@ -40,15 +38,12 @@ def run(arguments: Namespace) -> None:
     film = baked_film.film_of(scene, effect, strip, baked_film.KINDS[arguments.format], arguments.output)
     if arguments.attached:
         _check_parent(film)
-    total = len(film.frames)
+    total, numbers = len(film.frames), itertools.count(1)
     with command_line.using_device(arguments), film_output.progress(total, "frame") as moved:
-        finished = 0
 
-        def told(done: int) -> None:
-            nonlocal finished
-            moved(done - finished)
-            finished = done
-            command_line.print_line(f"{done} of {total}")
+        def told() -> None:
+            moved()
+            command_line.print_line(f"{next(numbers)} of {total}")
             if arguments.attached:
                 _check_parent(film)
 

@@ -1,7 +1,5 @@
 """The command `check`: whether an edit can be rendered on this machine."""
 
-from __future__ import annotations
-
 import argparse
 import re
 import sys
@@ -20,12 +18,11 @@ from ..devices import available
 from ..output import edit_check, error_report, film_join, film_output, shared_frames
 from ..rendering import render_job, render_settings
 from . import command_line
-from .command_line import to_path
 
 
 def add(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser("check", help="find out whether an edit can be rendered here")
-    option = parser.add_argument
+    option, to_path = parser.add_argument, command_line.to_path
     option("edit", metavar="FILE.blend", type=to_path, help="a saved edit")
     option("--frames", metavar="A:B", help="timeline frames A to B (default: all of the edit)")
     option("--output", type=to_path, metavar="DIR", help="folder for the frames; it gets the job's file")
@@ -61,25 +58,21 @@ def run(arguments: Namespace) -> None:
 
 def _checked(arguments: Namespace, scene: Scene, frames: range) -> tuple[str, list[str], list[str]]:
     """Return the name of the device, notes and faults."""
-    device, notes, faults = "none", [], [*_version_faults(scene), *_setting_faults(arguments, scene, frames)]
-    folders = [arguments.output] if arguments.output else []
-    folders += [arguments.movie.parent] if arguments.movie else []
+    faults = [*_version_faults(scene), *_setting_faults(arguments, scene, frames)]
+    device, lesser = "none", None
     try:
         kind, lesser = available.choose(render_settings.wanted())
+        device = available.name(kind)
     except NoDeviceError as error:
         faults.append(str(error))
-    else:
-        device, notes = available.name(kind), [lesser] if lesser else []
-        for check in edit_check.effects(scene, frames):
-            faults += [f'"{check.strip}": {check.fault}'] if check.fault else []
-            notes += [f'"{check.strip}": {note}' for note in check.notes]
-            folders += [folder for folder, count in check.mattes.items() if count]
-    faults += edit_check.left_out(scene, frames)
+    found = edit_check.effects(scene, frames)
+    faults += found.faults
     faults += external_files.faults(scene, frames, sources=False)  # the effects' own faults are already there
     faults += external_files.sound_faults(scene, frames)
-    for folder in dict.fromkeys(folders):
+    movie = arguments.movie and arguments.movie.parent
+    for folder in filter(None, dict.fromkeys((arguments.output, movie, *found.folders))):
         faults += _fault(film_output.check_writable, folder)
-    return device, notes, faults
+    return device, [note for note in (lesser, *found.notes) if note], faults
 
 
 def _version_faults(scene: Scene) -> list[str]:
@@ -104,7 +97,7 @@ def _setting_faults(arguments: Namespace, scene: Scene, frames: range) -> list[s
     if arguments.output:
         faults += _fault(shared_frames.check, arguments.output, arguments.format, frames, read)
     if arguments.movie:
-        faults += _fault(film_join.check, arguments.movie, [*read, *versions.sounds()])
+        faults += _fault(film_join.check, arguments.movie, read)
     is_movie = arguments.movie or scene.render.image_settings.media_type == "VIDEO"
     film = arguments.movie or Path("film.mp4" if is_movie else "frames")
     return faults or _fault(film_output.check, film, None, film_output.size(scene))

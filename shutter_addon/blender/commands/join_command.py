@@ -1,7 +1,5 @@
 """The command `join`: a movie of rendered frames, with the edit's sound."""
 
-from __future__ import annotations
-
 import argparse
 from argparse import Namespace
 
@@ -9,12 +7,11 @@ from ...core.farm import job_file
 from ..data import external_files, versions
 from ..output import film_join, film_output
 from . import command_line
-from .command_line import to_path
 
 
 def add(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser("join", help="make a movie of rendered frames, with the edit's sound and settings")
-    option = parser.add_argument
+    option, to_path = parser.add_argument, command_line.to_path
     option("folder", metavar="FRAMES", type=to_path, help="the folder of the frames")
     option("--edit", type=to_path, required=True, metavar="FILE.blend", help="the edit that they were rendered from")
     option("--output", type=to_path, required=True, help=f"a movie ({', '.join(film_output.MOVIES)})")
@@ -24,7 +21,7 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 def run(arguments: Namespace) -> None:
     scene, frames = command_line.open_edit(arguments.edit, arguments.frames)
-    film_join.check(arguments.output, [arguments.edit, *versions.read_files(scene), *versions.sounds()])
+    film_join.check(arguments.output, [arguments.edit, *versions.read_files(scene)])
     for fault in external_files.sound_faults(scene, frames):
         raise film_output.OutputError(fault)  # Blender would make a silent film
     version = versions.of_edit(scene)

@@ -1,7 +1,5 @@
 """The command `render`: a film of a source and a recipe, or of a saved edit, through Blender's sequencer."""
 
-from __future__ import annotations
-
 import argparse
 from argparse import Namespace
 from pathlib import Path
@@ -21,12 +19,11 @@ from ..editing import whole_edits
 from ..output import film_output, shared_frames
 from ..rendering import render_settings
 from . import command_line
-from .command_line import to_path
 
 
 def add(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser("render", help="render a source through a recipe, or a saved edit")
-    option = parser.add_argument
+    option, to_path = parser.add_argument, command_line.to_path
     option("source", type=to_path, help="a movie, the first file of an image sequence, or a saved edit (.blend)")
     option("--recipe", type=to_path, help="the effect, a JSON file; not for a saved edit")
     option("--output", type=to_path, help=f"a folder, or a movie ({', '.join(film_output.MOVIES)})")
@@ -91,11 +88,10 @@ def _render_source(arguments: Namespace) -> None:
         film_output.set_output(scene, output, file_format, alpha=medium.alpha != "opaque")
     if arguments.save:
         _save(scene, arguments.save)
-    weights = arguments.weights if output else None
-    with render_settings.using(arguments.device, weights, arguments.gpu_memory):
-        if output and arguments.weights:
-            film_output.make_folder(arguments.weights)
-        if output:
+    if output and arguments.weights:
+        film_output.make_folder(arguments.weights)
+    if output:
+        with render_settings.using(arguments.device, arguments.weights, arguments.gpu_memory):
             film_output.render_made_edit(scene, output)
 
 

@@ -1,7 +1,5 @@
 """The command `track`: keys for a region of a recipe, which follows what it covers, or for the camera."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from argparse import Namespace
@@ -28,12 +26,11 @@ from ..editing import whole_edits
 from ..output import film_output
 from ..rendering import render_job
 from . import command_line
-from .command_line import to_path
 
 
 def add(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser("track", help="follow what a region covers, or the camera")
-    option = parser.add_argument
+    option, to_path = parser.add_argument, command_line.to_path
     option("source", type=to_path, help="a movie, or the first file of an image sequence")
     option("--recipe", type=to_path, required=True, help="the effect, a JSON file")
     option("--region", metavar="NAME", help="the region to track")

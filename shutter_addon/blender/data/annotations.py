@@ -1,7 +1,5 @@
 """Scribbles: annotation layers and strokes, and the transform between an effect's picture and the sequencer's image."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import bpy
@@ -114,12 +112,6 @@ def layer_of(effect: PropertyGroup, region: PropertyGroup, name: str = "layer") 
 def layers_of(effect: PropertyGroup, region: PropertyGroup) -> list:
     """Return all annotation layers of a region."""
     return [layer for name in LAYERS if (layer := layer_of(effect, region, name)) is not None]
-
-
-def is_hidden(effect: PropertyGroup, region: PropertyGroup) -> bool:
-    """Tell whether the user has hidden a region's lines."""
-    layer = layer_of(effect, region)
-    return layer is not None and layer.annotation_hide
 
 
 def annotation(effect: PropertyGroup) -> Annotation:

@@ -1,7 +1,5 @@
 """Keep parts of an effect consistent: bars with the window, regions with shutters' names, scribbles with colors."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Container
 
 import numpy as np
@@ -89,19 +87,14 @@ def fit_bars(effect: PropertyGroup) -> None:
     Shutters that keep to a preset get its bars. Others forget theirs; they, and keys, keep their shape and share of
     light.
     """
-    for index in range(len(effect.shutters)):
-        _fit_bars(effect, index)
-
-
-def _fit_bars(effect: PropertyGroup, index: int) -> None:
-    shutter = effect.shutters[index]
-    shutter.preset = preset_of(effect, index)
-    if shutter.preset:
-        shutter.preset_position = effect.position
-        made = shutters.preset_bars(shutter.preset, effect.window, effect.position.lower())
-        _change_bars(effect, index, lambda _old: made)
-    elif len(shutter.bars) not in (0, effect.window):
-        _change_bars(effect, index, lambda old: shutters.resample(old, effect.window))
+    for index, shutter in enumerate(effect.shutters):
+        shutter.preset = preset_of(effect, index)
+        if shutter.preset:
+            shutter.preset_position = effect.position
+            made = shutters.preset_bars(shutter.preset, effect.window, effect.position.lower())
+            _change_bars(effect, index, lambda _old, made=made: made)
+        elif len(shutter.bars) not in (0, effect.window):
+            _change_bars(effect, index, lambda old: shutters.resample(old, effect.window))
 
 
 def count_filmed(effect: PropertyGroup) -> None:
@@ -110,22 +103,17 @@ def count_filmed(effect: PropertyGroup) -> None:
     Raises:
         EffectError: A value is out of range.
     """
-    steps = int(effect.inbetween)
-    for index in range(len(effect.shutters)):
-        _count_bars(effect, index, steps, validation.word(effect, "position").lower())
+    steps, position = int(effect.inbetween), validation.word(effect, "position").lower()
+    for index, shutter in enumerate(effect.shutters):
+        counted = Shutter(
+            name=shutter.name,
+            bars=keyframes.Bars(keyframes.Constant(None)),
+            follow=None if shutter.follow == "NOTHING" else STILL_CAMERA,
+            length=shutter.length.lower(),
+            combine=shutter.combine.lower(),
+        )
+        _change_bars(effect, index, lambda old, counted=counted: counted.filmed(old, steps, position).bars)
     effect.window = -(-effect.window // steps)
-
-
-def _count_bars(effect: PropertyGroup, index: int, steps: int, position: str) -> None:
-    shutter = effect.shutters[index]
-    counted = Shutter(
-        name=shutter.name,
-        bars=keyframes.Bars(keyframes.Constant(None)),
-        follow=None if shutter.follow == "NOTHING" else STILL_CAMERA,
-        length=shutter.length.lower(),
-        combine=shutter.combine.lower(),
-    )
-    _change_bars(effect, index, lambda old: counted.filmed(old, steps, position).bars)
 
 
 def preset_of(effect: PropertyGroup, index: int) -> str:
@@ -142,7 +130,7 @@ def preset_of(effect: PropertyGroup, index: int) -> str:
     return shutter.preset if is_kept else ""
 
 
-def _change_bars(effect: PropertyGroup, index: int, change: Callable[[np.ndarray], np.ndarray]) -> None:
+def _change_bars(effect: PropertyGroup, index: int, change: Callable[..., np.ndarray]) -> None:
     """Apply a function to a shutter's bars, and to their values at all keys. It may change their number."""
     shutter = effect.shutters[index]
     scene, path = effect.id_data, f"{effect.path_from_id()}.shutters[{index}].bars"

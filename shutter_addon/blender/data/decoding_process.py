@@ -5,8 +5,6 @@ and `wanted`: "about", "close", or a frame's index. A file may be open several t
 is the script's last argument, a line of JSON, and as many bytes as its `bytes` says.
 """
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

@@ -4,14 +4,12 @@ Previews drop finished frames when it changes. A bake stores a hash of it, which
 the timeline and the files on disk.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Callable, Hashable, Iterator
 from dataclasses import replace
 
 import numpy as np
-from bpy.types import FCurve, PropertyGroup, Scene, Strip
+from bpy.types import PropertyGroup, Scene, Strip
 
 from ...core import revision
 from ...core.frames.retiming import StripTiming
@@ -109,7 +107,7 @@ def parts(
     transform = f"{strip.path_from_id()}.transform."
     yield from _curves(scene, effect.path_from_id() + ".", start)
     yield from _curves(scene, transform, start)
-    keyed = {c.data_path.removeprefix(transform) for c in fcurves.curves_under(scene, transform) if _drives(c)}
+    keyed = {c.data_path.removeprefix(transform) for c in fcurves.curves_under(scene, transform) if fcurves.drives(c)}
     # As text, because NaN never equals NaN.
     yield repr([getattr(strip.transform, name) for name in TRANSFORM if name not in keyed])
     yield repr(tuple(strip.transform.origin)), strip.use_flip_x, strip.use_flip_y
@@ -123,7 +121,7 @@ def _source(effect: PropertyGroup, source: Strip, files: Files, start: int) -> H
 def _settings(effect: PropertyGroup) -> Iterator[Hashable]:
     """Yield an effect's properties that are not keyed, except names and colors."""
     path, followed = effect.path_from_id(), [region.name for region in effect.regions]
-    curves = filter(_drives, fcurves.curves_under(effect.id_data, path + "."))
+    curves = filter(fcurves.drives, fcurves.curves_under(effect.id_data, path + "."))
     keyed = {(curve.data_path, curve.array_index) for curve in curves}
 
     def values(group: PropertyGroup, place: str, *names: str) -> Iterator[Hashable]:
@@ -146,11 +144,6 @@ def _settings(effect: PropertyGroup) -> Iterator[Hashable]:
     for i, region in enumerate(effect.regions):
         yield from values(region, f".regions[{i}]", *names, "kind", "matte", "channel_name", *_MOVES)
         yield tuple((noted.frame, tuple(noted.location), noted.rotation, noted.scale) for noted in region.drawn)
-
-
-def _drives(curve: FCurve) -> bool:
-    """Tell whether an F-curve drives its property."""
-    return not (curve.mute or curve.is_empty)
 
 
 def _setting_names(*kinds: type) -> list[str]:

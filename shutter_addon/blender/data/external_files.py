@@ -1,7 +1,5 @@
 """Files that data-blocks name: images, volumes, sounds, libraries; and faults of those that an edit needs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -70,7 +68,7 @@ def sound_faults(scene: Scene, frames: range) -> list[str]:
 def _of_strips(scene: Scene, frames: range, kinds: tuple[str, ...], *, sources: bool) -> list[str]:
     sentences = []
     for shown, wanted in requirements.scenes_at(scene, frames):
-        others = () if sources else strips.shown_sources(shown)
+        others = [] if sources else [each.source.name for each in strips.with_sources(shown)]
         for strip in shown.sequence_editor.strips_all:
             at = frame_ranges.common(requirements.shown_frames(shown, strip), wanted)
             if at and strip.type in kinds and strip.name not in others:

@@ -6,7 +6,6 @@ The engine gets the effect scene's depsgraph, which does not contain other scene
 import re
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import Any
 
 import bpy
 import numpy as np
@@ -55,7 +54,7 @@ class Curves:
 
     def __init__(self, scene):
         self._pace = stretched(scene)
-        found = (c for c in curves_under(scene, "") if not (c.mute or c.is_empty))
+        found = (c for c in curves_under(scene, "") if drives(c))
         self._curves = {(c.data_path, c.array_index): c if self._pace == 1 else Timed(c, scene) for c in found}
 
     def find(self, path: str, index: int = 0):
@@ -116,18 +115,6 @@ def _eases(curve) -> list[Ease]:
     """Return the eases of an F-curve's keys as recipes name them; unknown ones become "bezier"."""
     eases = numbers(curve.keyframe_points, "interpolation", np.int32)
     return [_EASES.get(number, "bezier") for number in eases.tolist()]
-
-
-def key_frames(curves) -> list[float]:
-    """Return the frames with a key on any of the curves, ascending."""
-    frames = [points_of(curve)[:, 0] for curve in curves]
-    return np.unique(np.concatenate([np.empty(0, np.float32), *frames])).tolist()
-
-
-def leading(curves, start: float, end: float) -> tuple[Any, float, float]:
-    """Return the F-curve that changes most between two frames, whose easing counts for all, and its values there."""
-    ends = [(curve, curve.evaluate(start), curve.evaluate(end)) for curve in curves]
-    return max(ends, key=lambda end: abs(end[2] - end[1]))
 
 
 def progress(curve, first: float, last: float, frame: float) -> float:
@@ -238,6 +225,11 @@ def _reindex(owner: PropertyGroup, collection: str, places: Mapping[int, int | N
             _channelbag(scene).fcurves.remove(curve)
         elif place != index:
             curve.data_path = f"{path}[{place}]{curve.data_path[match.end() :]}"
+
+
+def drives(curve) -> bool:
+    """Tell whether an F-curve drives its property."""
+    return not (curve.mute or curve.is_empty)
 
 
 def curves_under(scene, path: str) -> list:

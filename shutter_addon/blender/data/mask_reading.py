@@ -3,8 +3,6 @@
 Python's API has a mask only at a scene's frame. So a mask that moves is no matte, but can become an outline.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from itertools import chain

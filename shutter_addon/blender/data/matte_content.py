@@ -3,8 +3,6 @@
 Regions know a matte strip by an identity, so that it may be renamed and cut.
 """
 
-from __future__ import annotations
-
 import uuid
 from contextlib import closing
 from fractions import Fraction
@@ -47,7 +45,9 @@ def content(sampling: Sampling, region: PropertyGroup, moves: Moves) -> Channel:
     if matte == "STRIP":
         return _strip_frames(sampling, region)
     if matte == "MASK":
-        return _mask(region)
+        if region.mask is None:
+            raise EffectError(rpt_("{place}: it has no mask").format(place=validation.place(region)))
+        return keyframes.Constant(mask_reading.still(region.mask))
     first = strips.origin(sampling.strip) if validation.word(region, "timing") == "TIMELINE" else None
     return mattes.FileFrames(file=image_file(region), offset=validation.number(region, "offset"), first=first)
 
@@ -100,12 +100,6 @@ def image_file(region: PropertyGroup) -> MatteFile:
         stamps = *stamps, source_media.stamps((region.image.session_uid, path, stamps), lambda: sequence_files(path))
     files = (path,) if region.image.source == "FILE" else None
     return MatteFile(path=path, channel=channel(region), files=files, stamp=stamps)
-
-
-def _mask(region: PropertyGroup) -> Channel:
-    if region.mask is None:
-        raise EffectError(rpt_("{place}: it has no mask").format(place=validation.place(region)))
-    return keyframes.Constant(mask_reading.still(region.mask))
 
 
 def filmed_frames(sampling: Sampling) -> dict[float, int]:
@@ -164,8 +158,7 @@ def choose_strip(region: PropertyGroup, name: str) -> None:
     if strip is None:
         region.strip = ""
         return
-    known = strip.virtual_shutter_matte
-    same = [other for other in editor.strips_all if known and other.virtual_shutter_matte == known]
+    same = strips.identified(region.id_data, "virtual_shutter_matte", strip.virtual_shutter_matte)
     cut = [other for other in same if strips.origin(other) == strips.origin(strip) and not strips.overlap(other, strip)]
     parts = [strip, *cut]
     if len(parts) != len(same):  # it has no identity, or that of the strip that it was copied from
@@ -211,6 +204,4 @@ def part_at(parts: list, frame: float) -> Strip:
 
 
 def _with_identity(region: PropertyGroup) -> list:
-    editor = region.id_data.sequence_editor
-    strips_all = editor.strips_all if editor and region.strip else ()
-    return [strip for strip in strips_all if strip.virtual_shutter_matte == region.strip]
+    return strips.identified(region.id_data, "virtual_shutter_matte", region.strip)

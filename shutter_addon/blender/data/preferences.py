@@ -60,21 +60,17 @@ class ShutterPreferences(bpy.types.AddonPreferences):
 
 def device() -> str:
     """Return the render device that the user wants, one of devices.available.CHOICES."""
-    preferences = _preferences()
-    known = preferences.device if preferences else ""  # "" also for a device of a newer version
-    return known.lower() or "auto"
+    return getattr(_preferences(), "device", "").lower() or "auto"  # "" also for a device of a newer version
 
 
 def gpu_memory() -> int:
     """Return the megabytes of the GPU that textures may take; 0: as devices.device allows."""
-    preferences = _preferences()
-    return preferences.gpu_memory if preferences else 0
+    return getattr(_preferences(), "gpu_memory", 0)
 
 
 def model() -> Path:
     """The file of the model that finds subjects."""
-    preferences = _preferences()
-    return model_path(bpy.path.abspath(preferences.model) if preferences else "")
+    return model_path(bpy.path.abspath(getattr(_preferences(), "model", "")))
 
 
 def _preferences() -> ShutterPreferences | None:

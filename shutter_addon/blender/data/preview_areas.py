@@ -91,7 +91,9 @@ def shown(context: Context, channel: int = 0) -> Shown | None:
         return None
     _, effect, strip = seen
     above = any(other.channel > strip.channel for other in selection.visible(scene))
-    hidden = tuple(annotations.is_hidden(effect, region) for region in strips.drawn_regions(effect))
+    drawn = [region for region in strips.used_regions(effect) if region.kind not in strips.MATTES]
+    layers = [annotations.layer_of(effect, region) for region in drawn]
+    hidden = tuple(layer is not None and layer.annotation_hide for layer in layers)
     return Shown(scene=scene, effect=effect, strip=strip, strips_above=above, hides_strokes=hidden)
 
 

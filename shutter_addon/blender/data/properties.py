@@ -77,16 +77,14 @@ def _region_renamed(region: PropertyGroup, new: str, old: str, is_set: bool) -> 
     return new
 
 
-def choice(
-    name: str,
-    description: str,
-    items: Sequence[tuple[str, str, str]],
-    *,
-    update: Callable | None = changed,
-    **more: str,
-) -> object:
+def labelled(kind: Callable, name: str, description: str, **more: Any) -> object:
+    """Return a property of a kind, which by default changes pictures."""
+    return kind(name=name, description=description, **({"update": changed} | more))
+
+
+def choice(name: str, description: str, items: Sequence[tuple[str, str, str]], **more: Any) -> object:
     """Return an enum property without keys, which by default changes pictures."""
-    return EnumProperty(name=name, description=description, items=items, update=update, options=set(), **more)
+    return labelled(EnumProperty, name, description, items=items, options=set(), **more)
 
 
 class TrackStop(PropertyGroup):
@@ -169,27 +167,18 @@ def scale_property(description: str, **more: Any) -> object:
     model.Region, model.OutlineRegion, model.FileContent, model.RampContent, name={"set_transform": _region_renamed}
 )
 class ShutterRegion(_Tracked, PropertyGroup):
-    shutter: StringProperty(name="Shutter", description="Name of the shutter that holds in the region", update=changed)
-    layer: StringProperty(name="Layer", description="Annotation layer that holds the strokes", update=changed)
-    not_layer: StringProperty(
-        name="Not This", description="Annotation layer of strokes on what the subject is not", update=changed
-    )
-    outline_layer: StringProperty(
-        name="Outlines", description="Annotation layer of outlines that overrule the model", update=changed
-    )
+    shutter: labelled(StringProperty, "Shutter", "Name of the shutter that holds in the region")
+    layer: labelled(StringProperty, "Layer", "Annotation layer that holds the strokes")
+    not_layer: labelled(StringProperty, "Not This", "Annotation layer of strokes on what the subject is not")
+    outline_layer: labelled(StringProperty, "Outlines", "Annotation layer of outlines that overrule the model")
     # The first stroke makes it a subject, if a model finds one there.
     finds_subject: BoolProperty(options={"HIDDEN"})
     # Empty: drawings lie where the region has not moved. Otherwise, each lies where it was drawn.
     drawn: CollectionProperty(type=DrawnPlace)
     kind: choice("Type", "What says where the shutter holds", KINDS, translation_context=CONTEXT)
     matte: choice("From", "What the matte is", MATTE_SOURCES)
-    image: PointerProperty(
-        name="File",
-        description="Movie, image sequence or picture that is the matte",
-        type=bpy.types.Image,
-        update=changed,
-    )
-    strip: StringProperty(name="Strip", description="Identity of the strip that is the matte", update=changed)
+    image: labelled(PointerProperty, "File", "Movie, image sequence or picture that is the matte", type=bpy.types.Image)
+    strip: labelled(StringProperty, "Strip", "Identity of the strip that is the matte")
     strip_name: StringProperty(
         name="Strip",
         description="Strip that is the matte",
@@ -197,10 +186,8 @@ class ShutterRegion(_Tracked, PropertyGroup):
         set=matte_content.choose_strip,
         options={"SKIP_SAVE"},
     )
-    mask: PointerProperty(name="Mask", description="Mask that is the matte", type=bpy.types.Mask, update=changed)
-    channel_name: StringProperty(
-        name="Channel Name", description="Name of the channel in the EXR file", maxlen=MAX_CHANNEL, update=changed
-    )
+    mask: labelled(PointerProperty, "Mask", "Mask that is the matte", type=bpy.types.Mask)
+    channel_name: labelled(StringProperty, "Channel Name", "Name of the channel in the EXR file", maxlen=MAX_CHANNEL)
     location: location_property(
         "Distance from where the region was drawn, as a fraction of the picture", update=changed
     )
@@ -251,14 +238,8 @@ def _region_selected(effect: PropertyGroup, _context: Context) -> None:
 
 
 class ShutterBar(PropertyGroup):
-    weight: FloatProperty(
-        name="Weight",
-        description="Contribution of the bar's frame",
-        default=1.0,
-        min=0.0,
-        max=MAX_BAR,
-        soft_max=1.0,
-        update=changed,
+    weight: labelled(
+        FloatProperty, "Weight", "Contribution of the bar's frame", default=1.0, min=0.0, max=MAX_BAR, soft_max=1.0
     )
 
 
@@ -266,9 +247,7 @@ class ShutterBar(PropertyGroup):
 class Shutter(PropertyGroup):
     bars: CollectionProperty(type=ShutterBar)
     follow: choice("Exposure Moves With", "What the exposure moves with", FOLLOWS)
-    follow_region: StringProperty(
-        name="Moved With", description="Name of the region that the exposure moves with", update=changed
-    )
+    follow_region: labelled(StringProperty, "Moved With", "Name of the region that the exposure moves with")
     # The last preset, and the effect's position when it was set (consistency.preset_of).
     preset: StringProperty(options={"HIDDEN"})
     preset_position: StringProperty(options={"HIDDEN"})
@@ -285,20 +264,20 @@ class _Settings:
     source: StringProperty(name="Source", description="Identity of the source strip")
     start: FloatProperty(name="Start", description="Timeline frame where the effect's content starts", options=set())
     camera: PointerProperty(name="Camera", description="Motion of what the camera sees", type=ShutterCamera)
-    use_source_time: BoolProperty(
-        name="Custom Time",
-        description="Show the source at the time that is set here, in place of the strip's own timing",
-        update=changed,
+    use_source_time: labelled(
+        BoolProperty,
+        "Custom Time",
+        "Show the source at the time that is set here, in place of the strip's own timing",
         options=set(),
     )
-    source_time: FloatProperty(
-        name="Source Time",
-        description="Source frame that is shown, 1 is the source's first; keyed, it is a speed ramp",
+    source_time: labelled(
+        FloatProperty,
+        "Source Time",
+        "Source frame that is shown, 1 is the source's first; keyed, it is a speed ramp",
         default=1.0,
         min=-MAX_FRAME,
         max=MAX_FRAME,
         soft_min=1.0,
-        update=changed,
     )
 
 

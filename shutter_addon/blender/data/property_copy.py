@@ -1,7 +1,5 @@
 """Copy property groups as they are stored, and set values temporarily."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any

@@ -1,7 +1,5 @@
 """What Blender's sequencer needs to ask the engine for an effect, and which data an edit's pictures use."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import bpy

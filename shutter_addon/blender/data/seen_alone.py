@@ -1,7 +1,5 @@
 """Whether a film shows nothing but an effect's picture, unchanged, and whether its 8-bit levels can be predicted."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import bpy

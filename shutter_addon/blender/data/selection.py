@@ -1,7 +1,5 @@
 """What is seen and what is active: scene, strip, effect, shutter and region."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from bpy.app.translations import pgettext_rpt as rpt_

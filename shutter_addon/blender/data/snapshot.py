@@ -5,8 +5,6 @@ scene. Blender itself evaluates F-curves, at the frames that are asked for. Driv
 action do not count (docs/manual.md).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -30,7 +28,7 @@ from ...media.subject import WIDTH
 from ...media.subject_mattes import Subject, SubjectFile
 from . import matte_content, preferences, sampled, source_media, strips, validation
 from .annotations import LAYERS, image_to_picture, layer_of, layers_of, picture_size
-from .fcurves import curves_under, key_frames, leading, progress, stretched
+from .fcurves import curves_under, points_of, progress, stretched
 from .sampled import Frames, Sampling
 
 # Sentences of core/model/effect.py, for the list of texts to translate.
@@ -191,14 +189,6 @@ def region_at(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, fra
     return read_region(Sampling.of(scene, effect, strip, frames), index, 0)
 
 
-def matte_content_at(
-    scene: Scene, effect: PropertyGroup, strip: Strip, index: int, frames: Frames
-) -> keyframes.Channel:
-    """Return the content of a matte, ramp or outline, sampled as in region_at."""
-    region: Any = _any_region(Sampling.of(scene, effect, strip, frames), index, 0)
-    return region.content
-
-
 def carried_outline(
     scene: Scene, effect: PropertyGroup, strip: Strip, index: int, frames: Frames
 ) -> tuple[CarriedFile | SubjectFile, dict[float, int]]:
@@ -207,13 +197,12 @@ def carried_outline(
     Raises:
         EffectError, MediaError: The outline is linear, or has no source.
     """
-    region, sampling = effect.regions[index], Sampling.of(scene, effect, strip, frames)
-    shown = source_frames(scene, effect, strip, frames)
-    if region.kind == "SUBJECT":
-        return _subject_file(sampling, *_marks(sampling, index).values()), shown
-    if validation.word(region, "between") == "STRAIGHT":
-        raise EffectError(rpt_("{place}: a linear outline is not tracked").format(place=validation.place(region)))
-    return _carried(sampling, sampling.drawings(index, every=True)), shown
+    sampling = Sampling.of(scene, effect, strip, frames)
+    _curves, file = _drawn(sampling, index)
+    if file is None:
+        place = validation.place(effect.regions[index])
+        raise EffectError(rpt_("{place}: a linear outline is not tracked").format(place=place))
+    return file, matte_content.filmed_frames(sampling)
 
 
 def source_frames(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames) -> dict[float, int]:
@@ -312,7 +301,8 @@ def _ways(curves: list, keys: list[float], frames: Frames) -> dict[float, tuple[
         before, after, _share = keyframes.span(keys, frame)
         ends = keys[before], keys[after]
         if ends not in leaders:
-            leaders[ends] = leading(curves, *ends)
+            reached = [(curve, curve.evaluate(ends[0]), curve.evaluate(ends[1])) for curve in curves]
+            leaders[ends] = max(reached, key=lambda values: abs(values[2] - values[1]))
         ways[frame] = ends, progress(*leaders[ends], frame)
     return ways
 
@@ -327,43 +317,37 @@ def _any_region(sampling: Sampling, index: int, shutter: int) -> model.Region | 
     if region.kind not in strips.LAID:
         return _region(sampling, index, shutter)
     moves = sampling.moves(region, path)
-    kind: type[model.MatteRegion] = model.MatteRegion
+    kinds: dict = {"OUTLINE": model.OutlineRegion, "SUBJECT": model.SubjectRegion}
     drawn: dict = {}
-    if region.kind == "OUTLINE":
-        drawings = sampling.drawings(index, every=True)
-        kind, drawn = model.OutlineRegion, {"drawings": drawings}
-        content = _outlines(sampling, region, drawings)
-    elif region.kind == "SUBJECT":
-        kind, drawn = model.SubjectRegion, _marks(sampling, index)
-        content = mattes.FileFrames(file=_subject_file(sampling, *drawn.values()))
+    if region.kind in strips.OUTLINED:
+        drawn, file = _drawn(sampling, index)
+        content = mattes.FileFrames(file=file) if file else model.drawn_outlines(*drawn.values())
     else:
         content = matte_content.content(sampling, region, moves)
+    kind = kinds.get(region.kind, model.MatteRegion)
     return kind(shutter=shutter, content=content, moves=moves, **drawn, **sampling.fields(region, path, kind))
 
 
-def _outlines(sampling: Sampling, region: PropertyGroup, drawings: model.Drawings) -> keyframes.Channel:
-    """Return the content of an outline. EffectError, MediaError: there is no source."""
-    if validation.word(region, "between") == "STRAIGHT":
-        return model.drawn_outlines(drawings)
-    return mattes.FileFrames(file=_carried(sampling, drawings))
+def _drawn(sampling: Sampling, index: int) -> tuple[dict[str, Any], CarriedFile | SubjectFile | None]:
+    """Return what is drawn in an outline or a subject, by the model's names, and the file of its tracked mattes.
 
+    The mattes of a linear outline are not tracked, so that it has no file.
 
-def _carried(sampling: Sampling, drawings: model.Drawings) -> CarriedFile:
-    drawn = _by_source_frame(sampling, drawings)
-    return CarriedFile(**matte_content.tracked(sampling), drawings=tuple(sorted(drawn.items())))
-
-
-def _subject_file(sampling: Sampling, *marks: model.Drawings) -> SubjectFile:
-    """Return the file that gives a subject's mattes. `marks` are from _marks."""
-    strokes, nots, drawn = (_by_source_frame(sampling, each) for each in marks)
-    subject, drawings = Subject(strokes=strokes, nots=nots, width=WIDTH), tuple(sorted(drawn.items()))
-    return SubjectFile(**matte_content.tracked(sampling), subject=subject, drawings=drawings, model=preferences.model())
-
-
-def _marks(sampling: Sampling, index: int) -> dict[str, model.Drawings]:
-    """Return what is drawn in a subject, by names of model.SubjectRegion."""
-    names = "drawings", "nots", "outlines"
-    return {name: sampling.drawings(index, True, layer) for name, layer in zip(names, LAYERS, strict=True)}
+    Raises:
+        EffectError, MediaError: There is no source.
+    """
+    region = sampling.effect.regions[index]
+    is_subject = region.kind == "SUBJECT"
+    names = dict(zip(("drawings", "nots", "outlines"), LAYERS, strict=True)) if is_subject else {"drawings": LAYERS[0]}
+    drawn = {name: sampling.drawings(index, True, layer) for name, layer in names.items()}
+    if not is_subject and validation.word(region, "between") == "STRAIGHT":
+        return drawn, None
+    *marks, curves = (_by_source_frame(sampling, each) for each in drawn.values())
+    made: dict = matte_content.tracked(sampling) | {"drawings": tuple(sorted(curves.items()))}
+    if not is_subject:
+        return drawn, CarriedFile(**made)
+    subject = Subject(strokes=marks[0], nots=marks[1], width=WIDTH)
+    return drawn, SubjectFile(**made, subject=subject, model=preferences.model())
 
 
 def _by_source_frame(sampling: Sampling, drawings: model.Drawings) -> dict[int, outlines.Curves]:
@@ -412,8 +396,7 @@ def recipe_of(scene: Scene, effect: PropertyGroup, strip: Strip, contents: Seque
             sentence = rpt_('strip "{strip}": frame {frame} lies beyond the timeline')
             raise EffectError(sentence.format(strip=strip.name, frame=f"{frame:.7g}"))
     if effect.regions and image_to_picture(strip, picture_size(effect)) is None:
-        sentence = rpt_('strip "{strip}" is too small to find its scribbles')
-        raise EffectError(sentence.format(strip=strip.name))
+        raise EffectError(rpt_('strip "{strip}" is too small to find its scribbles').format(strip=strip.name))
     with translated(rpt_):
         plain = read(scene, effect, strip, sorted({*shown, *keyed}))
         return baking.baked(plain, shown, contents)
@@ -422,7 +405,6 @@ def recipe_of(scene: Scene, effect: PropertyGroup, strip: Strip, contents: Seque
 def _keyed(scene: Scene, effect: PropertyGroup) -> set[float]:
     """Return the timeline frames of the effect's keys and drawings."""
     curves, pace = curves_under(scene, effect.path_from_id() + "."), stretched(scene)
-    # Curves has float32 keys, too.
-    frames = set((np.array(key_frames(curves), np.float32) / pace).tolist())
+    frames = {frame for curve in curves for frame in (points_of(curve)[:, 0] / pace).tolist()}
     layers = (layer for region in effect.regions for layer in layers_of(effect, region))
     return frames.union(float(drawing.frame_number) for layer in layers for drawing in layer.frames)

@@ -1,12 +1,11 @@
 """The footage of a source strip: its files, how it is opened, its timing, retiming keys and proxies."""
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
@@ -33,8 +32,7 @@ _SEQUENCE = ("char name[64]", "S64"), ("SeqRetimingHandle *retiming_handles", "u
 _KEY = ("double strip_frame_index", "f8"), ("int flag", "i4"), ("float retiming_factor", "f4")
 
 
-_specs: Kept[tuple, SourceSpec] = Kept()  # by media_key
-_looks: Kept[Hashable, int] = Kept()  # what `stamps` returns
+_known: Kept[Hashable, Any] = Kept()  # what `stamps` and `spec` return
 
 
 def media_key(strip: Strip) -> tuple:
@@ -53,12 +51,12 @@ def media_key(strip: Strip) -> tuple:
 
 def look_again() -> None:
     """Have all files checked at the next look."""
-    _looks.clear()
+    _known.clear()
 
 
 def stamps(place: Hashable, files: Callable[[], Iterable[Path]]) -> int:
     """Return a number that changes when look_again finds that a file of a sequence was replaced. `place` is its key."""
-    return _looks.ask(place, lambda: hash(tuple(map(stamp, files()))), _KEPT)
+    return _known.ask(place, lambda: hash(tuple(map(stamp, files()))), _KEPT)
 
 
 def reading(strip: Strip) -> tuple:
@@ -124,10 +122,10 @@ class SourceSpec:
         return with_proxy(medium, partial(open_source, proxy.path, **how))
 
 
-def spec(strip: Strip, key: tuple | None = None) -> SourceSpec:
-    """Return what a source strip reads. `key` is its media_key, if known. MediaError: it has no files."""
-    key = key or media_key(strip)
-    return _specs.ask(key, lambda: _spec(strip, key), _KEPT)
+def spec(strip: Strip) -> SourceSpec:
+    """Return what a source strip reads. MediaError: it has no files."""
+    key = media_key(strip)
+    return _known.ask(key, lambda: _spec(strip, key), _KEPT)
 
 
 def _spec(strip: Strip, key: tuple) -> SourceSpec:

@@ -1,7 +1,5 @@
 """Effect strips: Scene strips above their source, and the scene, effect and source that belong to them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from typing import Any, NamedTuple
@@ -131,7 +129,7 @@ def source_of(scene: Scene, effect: PropertyGroup, strip: Strip) -> Strip:
         EffectError: It was deleted, or is not a movie, image or clip strip.
     """
     if (source := nearest_source(scene, effect, strip)) is None:
-        if others := _with_identity(scene, effect.source):
+        if others := identified(scene, "virtual_shutter_source", effect.source):
             sentence = rpt_('the source of "{strip}", "{source}", is not a movie, image or clip strip')
             raise EffectError(sentence.format(strip=strip.name, source=others[0].name))
         raise EffectError(rpt_('the source strip of "{strip}" was deleted').format(strip=strip.name))
@@ -152,14 +150,9 @@ def shown_effects(scene: Scene) -> list[Shown]:
     return [Shown(effect, strip, nearest_source(scene, effect, strip)) for effect, strip in pairs]
 
 
-def with_sources(scene: Scene) -> list[Shown]:
+def with_sources(scene: Scene) -> list[Any]:
     """Return the effects that the scene's strips show and that have a source."""
     return [each for each in shown_effects(scene) if each.source is not None]
-
-
-def shown_sources(scene: Scene) -> set[str]:
-    """Return the names of the source strips of the scene's effect strips."""
-    return {each.source.name for each in shown_effects(scene) if each.source}
 
 
 def nearest_source(scene: Scene, effect: PropertyGroup, strip: Strip) -> Any:
@@ -169,21 +162,18 @@ def nearest_source(scene: Scene, effect: PropertyGroup, strip: Strip) -> Any:
     def distance(other: Strip) -> tuple:
         apart = max(other.left_handle - strip.right_handle + 1, strip.left_handle - other.right_handle + 1, 0)
         elsewhere = other.parent_meta() != strip.parent_meta()
-        return (
-            apart,
-            elsewhere,
-            other not in connected,
-            other.channel > strip.channel,
-            abs(strip.channel - other.channel),
-        )
+        channels = other.channel - strip.channel
+        return apart, elsewhere, other not in connected, channels > 0, abs(channels)
 
-    candidates = [other for other in _with_identity(scene, effect.source) if other.type in SOURCES]
+    candidates = [
+        other for other in identified(scene, "virtual_shutter_source", effect.source) if other.type in SOURCES
+    ]
     return min(candidates, key=distance, default=None)
 
 
-def _with_identity(scene: Scene, identity: str) -> list:
-    """Return the scene's strips with a source identity, whatever their type."""
-    return [strip for strip in scene.sequence_editor.strips_all if strip.virtual_shutter_source == identity != ""]
+def identified(scene: Scene, name: str, identity: str) -> list:
+    """Return the scene's strips with an identity in a property, whatever their type; "" identifies none."""
+    return [strip for strip in all_strips(scene) if getattr(strip, name) == identity != ""]
 
 
 def invalidate(scene: Scene, effect_scene: Scene | None = None) -> None:
@@ -194,13 +184,7 @@ def invalidate(scene: Scene, effect_scene: Scene | None = None) -> None:
             strip.invalidate_cache("RAW")  # drops what was composed from it, too
 
 
-def drawn_regions(effect: PropertyGroup) -> list:
-    """Return the regions with strokes and a shutter, in order."""
+def used_regions(effect: PropertyGroup) -> list:
+    """Return the regions with a shutter, in order."""
     names = {shutter.name for shutter in effect.shutters}
-    return [region for region in effect.regions if region.shutter in names and region.kind not in MATTES]
-
-
-def matte_regions(effect: PropertyGroup) -> list:
-    """Return the mattes and ramps with a shutter, in order."""
-    names = {shutter.name for shutter in effect.shutters}
-    return [region for region in effect.regions if region.shutter in names and region.kind in MATTES]
+    return [region for region in effect.regions if region.shutter in names]

@@ -4,8 +4,6 @@ Every .blend file ends with a description of all records (SDNA). Blender writes 
 the offsets and sizes (dna_verify.cc). An empty file is written once and parsed.
 """
 
-from __future__ import annotations
-
 import ctypes
 import math
 import re

@@ -4,8 +4,6 @@ Blender keeps properties in range where users and F-curves set them. Scripts and
 and NaN gets past every range.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """The versions of the extension, of Blender, and of the open edit."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import tomllib
@@ -29,11 +27,6 @@ def extension() -> str:
     return tomllib.loads(MANIFEST.read_text(encoding="utf-8"))["version"]
 
 
-def blender() -> str:
-    """Return Blender's major, minor and micro version."""
-    return ".".join(map(str, bpy.app.version))
-
-
 def colours() -> str:
     """Return an identifier of Blender's OpenColorIO configuration; "": Blender's own, wherever it is installed.
 
@@ -44,42 +37,26 @@ def colours() -> str:
     if path.startswith("ocio://"):
         return path
     own = Path(bpy.utils.system_resource("DATAFILES", path="colormanagement"), "config.ocio")
-    digest = _config_digest(Path(path))
-    return "" if digest == _config_digest(own) else digest
-
-
-def _config_digest(path: Path) -> str:
-    """Return the digest of a file, or "" if it is missing: Blender then takes its own."""
-    try:
-        return _sha256(path)
-    except OSError:
-        return ""
-
-
-def _sha256(path: str | Path) -> str:
-    with open(path, "rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+    digest = _digest(Path(path), derived.WHOLE)  # None for a missing one: Blender then takes its own
+    return "" if digest in (None, _digest(own, derived.WHOLE)) else digest.hex()
 
 
 def of_edit(scene: Scene) -> EditVersion:
     """Return the version of the edit in the open .blend file. OSError: the file is gone."""
-    blend = _sha256(bpy.data.filepath)
+    with open(bpy.data.filepath, "rb") as file:
+        blend = hashlib.file_digest(file, "sha256").hexdigest()
     footage = hashlib.sha256()
     for files in _footage_files(scene):
         different = [path for path, _ in groupby(files)]  # a still that is held counts once
         for path, digest in zip(different, digests(different), strict=True):
             footage.update(digest or b"missing: " + os.fsencode(path.name))
-    return EditVersion(extension(), blender(), colours(), blend, footage.hexdigest())
+    return EditVersion(extension(), ".".join(map(str, bpy.app.version)), colours(), blend, footage.hexdigest())
 
 
 def read_files(scene: Scene) -> list[Path]:
-    """Return all files that the edit's pictures are made from, except the .blend file."""
-    return [path for files in _footage_files(scene) for path in files]
-
-
-def sounds() -> list[Path]:
-    """Return the files of all sounds."""
-    return [path for sound in bpy.data.sounds for path in external_files.named(sound)]
+    """Return all files that the edit is made from, except the .blend file: those of pictures, and of all sounds."""
+    sounds = map(external_files.named, bpy.data.sounds)
+    return [path for files in (*_footage_files(scene), *sounds) for path in files]
 
 
 def _footage_files(scene: Scene) -> Iterator[list[Path]]:

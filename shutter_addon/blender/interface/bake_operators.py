@@ -56,7 +56,7 @@ def bake(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] |
     film = baked_film.film_of(self.edit, effect, self.effect_strip, self.file_format)
     try:
         if bpy.app.background:
-            baked_film.render(self.edit, effect, self.effect_strip, film, lambda _done: None)
+            baked_film.render(self.edit, effect, self.effect_strip, film, lambda: None)
         if film.is_finished():
             baked_strips.lay(self.edit, self.effect_strip, film)
             return None

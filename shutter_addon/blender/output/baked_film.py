@@ -4,8 +4,6 @@ The pictures are the engine's. They bypass the sequencer, which would convert th
 EXR has the same bits. `render` makes them immediately, and `start` in a second Blender while the editor works on.
 """
 
-from __future__ import annotations
-
 import secrets
 import shutil
 import subprocess
@@ -39,7 +37,6 @@ FOLDER = "virtual_shutter_baked"  # beside the .blend file
 Kind = Literal["MOVIE", "OPEN_EXR"]
 KINDS: dict[str, Kind] = {"movie": "MOVIE", "exr": "OPEN_EXR"}  # by the command's names
 _CHANNELS = ["R", "G", "B", "A"]
-_ZSTD = b"\x28\xb5\x2f\xfd"  # the beginning of a compressed file
 _ROOT = Path(__file__).parents[3]  # of the extension, or of the checkout
 Picture = Callable[[int], np.ndarray]  # gives that of a frame
 
@@ -124,11 +121,11 @@ def _check(scene: Scene, effect: PropertyGroup, strip: Strip, kind: Kind) -> Non
             raise EffectError(rpt_("a movie has no light above white: bake to OpenEXR"))
 
 
-def render(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film, report: Callable[[int], object]) -> None:
+def render(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film, report: Callable[[], object]) -> None:
     """Render what is missing of a film. Finished frames stay when it is stopped or fails.
 
     Args:
-        report: Called with the number of finished frames. It may raise to stop.
+        report: Called after each frame. It may raise to stop.
 
     Raises:
         effect_source.FAULTS, OutputError, OSError: The film cannot be made.
@@ -136,7 +133,6 @@ def render(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film, report
     """
     if film.kind == "MOVIE" and film.is_finished():
         _remove_parts(film)
-        report(len(film.frames))
         return
     start = round(strips.origin(strip))
     taken = snapshot.take(scene, effect, strip, [start + frame for frame in film.frames])
@@ -158,30 +154,28 @@ def render(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film, report
         except (MediaError, OSError):
             if not film.is_finished():  # another process may have finished it and removed the parts
                 raise
-            report(len(film.frames))
 
 
-def _make_pictures(film: Film, picture: Picture, size: tuple[int, int], report: Callable[[int], object]) -> None:
+def _make_pictures(film: Film, picture: Picture, size: tuple[int, int], report: Callable[[], object]) -> None:
     _prepare(film.place)
     note = job_file.note(film.version)
-    for number, (path, frame) in enumerate(zip(film.pictures, film.frames, strict=True), start=1):
+    for path, frame in zip(film.pictures, film.frames, strict=True):
         there = rendered_pictures.read(path, film.version)
         if there is None or there.size != size:
             made = pictures.resized(picture(frame), *size)
             channels = 3 if (made[..., 3] == 1).all() else 4
             image_writing.write_exr(path, made[..., :channels], _CHANNELS[:channels], note)
-        report(number)
+        report()
 
 
-def _make_movie(film: Film, picture: Picture, fps: Fraction, report: Callable[[int], object]) -> None:
-    done = 0
+def _make_movie(film: Film, picture: Picture, fps: Fraction, report: Callable[[], object]) -> None:
     for path, frames in film.parts:
         if path.is_file() and is_whole_movie(path, len(frames)):
-            report(done + len(frames))
+            for _ in frames:
+                report()
         else:
             _prepare(path.parent)
-            film_parts.write_part(path, _counted(map(picture, frames), done, report), fps)
-        done += len(frames)
+            film_parts.write_part(path, _reported(map(picture, frames), report), fps)
     if not film.is_finished():  # another process may have finished it
         film_parts.join([path for path, _frames in film.parts], film.place, fps)
     _remove_parts(film)
@@ -207,10 +201,10 @@ def _remove_parts(film: Film) -> None:
         place.rmdir()
 
 
-def _counted(shown: Iterator[np.ndarray], done: int, report: Callable[[int], object]) -> Iterator[np.ndarray]:
-    for number, picture in enumerate(shown, start=done + 1):
+def _reported(shown: Iterator[np.ndarray], report: Callable[[], object]) -> Iterator[np.ndarray]:
+    for picture in shown:
         yield picture
-        report(number)
+        report()
 
 
 @dataclass
@@ -269,7 +263,7 @@ def start(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film) -> Bake
     log = atomic_write.new_part(film.place.parent)
     copy = edit.with_name(f"{edit.stem}.bake-{secrets.token_hex(4)}.blend")  # relative paths stay valid there
     try:
-        bpy.ops.wm.save_as_mainfile(filepath=str(copy), copy=True, compress=_is_compressed(edit), relative_remap=False)
+        bpy.ops.wm.save_as_mainfile(filepath=str(copy), copy=True, relative_remap=False)
         options = _options(scene, strip, film)
         with open(log / "out", "wb") as out, open(log / "err", "wb") as err:
             process = subprocess.Popen(
@@ -291,15 +285,6 @@ def _options(scene: Scene, strip: Strip, film: Film) -> list[str]:
     kind = next(name for name, kind in KINDS.items() if kind == film.kind)
     names = [f"--scene={scene.name}", f"--strip={strip.name}", f"--format={kind}", f"--output={film.place.parent}"]
     return [*names, f"--device={preferences.device()}", f"--gpu-memory={preferences.gpu_memory()}", "--attached"]
-
-
-def _is_compressed(edit: Path) -> bool:
-    """Return whether a .blend file is compressed. Saving a copy would change how Blender saves the user's file next."""
-    try:
-        with edit.open("rb") as file:
-            return file.read(4) == _ZSTD
-    except OSError:
-        return False
 
 
 def _command() -> list[str]:

@@ -1,7 +1,5 @@
 """Checking whether an edit can be rendered on this machine, without rendering it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from contextlib import closing
@@ -10,7 +8,6 @@ from pathlib import Path
 
 from bpy.types import PropertyGroup, Scene, Strip
 
-from ...compute.renderer import Renderer
 from ...compute.request import Request
 from ...core.frames import frame_ranges
 from ...core.frames.frame_source import FrameSource
@@ -24,33 +21,40 @@ from .film_output import OutputError
 
 
 @dataclass
-class EffectCheck:
-    """The check of an effect.
+class Findings:
+    """What a check finds.
 
     Attributes:
-        strip: Its name.
-        mattes: The number of outlines' mattes that have to be carried first, by their folder.
-        fault: Why the effect cannot be rendered, or None.
-        notes: Messages about an effect that can be rendered, but not as one may expect.
+        faults: Why the edit cannot be rendered.
+        notes: What can be rendered, but not as one may expect.
+        folders: Folders to which the render writes mattes.
     """
 
-    strip: str
-    mattes: dict[Path, int] = field(default_factory=dict)
-    fault: str | None = None
+    faults: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    folders: set[Path] = field(default_factory=set)
 
 
-def effects(scene: Scene, frames: range) -> list[EffectCheck]:
-    """Check the effects that the scene's frames show, including those of scenes in it.
+def effects(scene: Scene, frames: range) -> Findings:
+    """Check the effects that the scene's frames show, including those of scenes in it, each up to its first fault.
 
     Files are opened, and the first and last frames that are needed are read.
     """
     # No GPU is needed, which would have to wait for its first picture, since only states and windows are read.
-    session = RenderSession(lambda: ("cpu", None), lambda: None)
+    session, found = RenderSession(lambda: ("cpu", None), lambda: None), Findings()
     try:
-        return [_effect(session, shown) for shown in _shown_effects(scene, frames)]
+        for owner, effect, strip, shown in _shown_effects(scene, frames):
+            try:
+                _check_footage(owner, effect, strip)
+                notes = _notes(session, found.folders, snapshot.take(owner, effect, strip, shown))
+                found.notes += [f'"{strip.name}": {note}' for note in notes]
+            except (OutputError, *effect_source.FAULTS) as error:
+                found.faults.append(f'"{strip.name}": {error}')
     finally:
         session.forget()
+    reasons = [why for at, why in requirements.left_out(scene) if frame_ranges.common(at, frames)]
+    found.faults += dict.fromkeys(reasons)
+    return found
 
 
 def _shown_effects(film: Scene, frames: range) -> Iterator[tuple]:
@@ -66,25 +70,28 @@ def _shown_effects(film: Scene, frames: range) -> Iterator[tuple]:
             yield scene, effect, parts[0], shown
 
 
-def _effect(session: RenderSession, shown: tuple) -> EffectCheck:
-    """Check an effect of `_shown_effects`, up to the first fault."""
-    scene, effect, strip, frames = shown
-    check, context = EffectCheck(strip.name), RenderContext(session)
-    try:
-        _check_footage(scene, effect, strip)
-        taken = snapshot.take(scene, effect, strip, frames)
-        requests = [context.request(taken, frame) for frame in sorted(taken.frames)]
-        renderer = session.renderer(requests[0].source)
-        _check_frames(renderer, requests)
-        _check_mattes(check, renderer.source, requests)
-        check.notes += dict.fromkeys(note for request in requests for note in pictures.unread(taken, request))
-        if renderer.source.by_blender:
-            check.notes.append(pictures.SLOW_DECODING)
-        if lacking := sum(check.mattes.values()):
-            check.notes.append(f"{lacking} mattes of outlines are not tracked yet: the first render does that")
-    except (OutputError, *effect_source.FAULTS) as error:
-        check.fault = str(error)
-    return check
+def _notes(session: RenderSession, folders: set[Path], taken: snapshot.Snapshot) -> list[str]:
+    """Check an effect, and return notes.
+
+    Args:
+        folders: Gets the folders of mattes that the render has to track.
+
+    Raises:
+        OutputError, effect_source.FAULTS: The first fault.
+    """
+    context = RenderContext(session)
+    requests = [context.request(taken, frame) for frame in sorted(taken.frames)]
+    renderer = session.renderer(requests[0].source)
+    # All files of image sequences that windows need, and the first and last frame of a movie.
+    step, needed = renderer.source.step, set[int]().union(*map(renderer.missing, requests))
+    _check_readable(renderer.source, {end for index in needed for end in (index // step, -(-index // step))}, step)
+    lacking = _lacking_mattes(renderer.source, requests, folders)
+    notes = list(dict.fromkeys(note for request in requests for note in pictures.unread(taken, request)))
+    if renderer.source.by_blender:
+        notes.append(pictures.SLOW_DECODING)
+    if lacking:
+        notes.append(f"{lacking} mattes of outlines are not tracked yet: the first render does that")
+    return notes
 
 
 def _check_footage(scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
@@ -106,13 +113,6 @@ def _check_footage(scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
             raise OutputError(f'{medium.path.name}: has {words} "{source.name}"')
 
 
-def _check_frames(renderer: Renderer, requests: list[Request]) -> None:
-    """Check the files that windows need: all of image sequences, and the first and last frame of a movie."""
-    step = renderer.source.step
-    needed: set[int] = set().union(*map(renderer.missing, requests))
-    _check_readable(renderer.source, {end for index in needed for end in (index // step, -(-index // step))}, step)
-
-
 def _check_readable(source: FrameSource, indices: set[int], step: int = 1) -> None:
     """Raise MediaError if files of filmed frames are missing, or the first or last one cannot be decoded."""
     files = source.files
@@ -122,8 +122,14 @@ def _check_readable(source: FrameSource, indices: set[int], step: int = 1) -> No
         source.read(index * step)
 
 
-def _check_mattes(check: EffectCheck, source: FrameSource, requests: list[Request]) -> None:
+def _lacking_mattes(source: FrameSource, requests: list[Request], folders: set[Path]) -> int:
+    """Return the number of mattes that have to be tracked. MediaError: a matte cannot be read.
+
+    Args:
+        folders: Gets the folders that keep them.
+    """
     shown: dict = {}
+    lacking = 0
     for request in requests:
         layers = request.state.layers
         of_layers = layers.mattes[request.index - layers.first] if layers else ()
@@ -134,14 +140,9 @@ def _check_mattes(check: EffectCheck, source: FrameSource, requests: list[Reques
         with closing(file.open()) as medium:
             indices = {content.index(medium, index) for content, index in contents}
             indices = {min(max(index, 0), medium.count - 1) for index in indices}
-            if isinstance(medium, CarriedMattes):
-                lacking = sum(not medium.has(index) for index in indices)
-                check.mattes[file.folder] = check.mattes.get(file.folder, 0) + lacking
-            else:
+            if not isinstance(medium, CarriedMattes):
                 _check_readable(medium, indices)
-
-
-def left_out(scene: Scene, frames: range) -> list[str]:
-    """Return why the sequencer leaves out effects at some of these frames."""
-    reasons = [why for shown, why in requirements.left_out(scene) if frame_ranges.common(shown, frames)]
-    return list(dict.fromkeys(reasons))
+            elif missing := sum(not medium.has(index) for index in indices):
+                lacking += missing
+                folders.add(file.folder)
+    return lacking

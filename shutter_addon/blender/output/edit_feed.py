@@ -7,8 +7,6 @@ single picture keeps its floats, since a script can save it with other settings.
 ends, or when a file is saved or loaded, after which the engine renders.
 """
 
-from __future__ import annotations
-
 import os
 import tempfile
 from contextlib import ExitStack
@@ -42,44 +40,40 @@ class _Film:
         strip: Name of the file's strip; None: not added yet.
         file: The file of levels; None: not made yet.
         makes_levels: The result of seen_alone.makes_levels; None: unknown.
-        has_failed: Whether feeding failed.
         has_begun: Whether a frame was rendered.
     """
 
     scene: int
     changed: ExitStack = field(default_factory=ExitStack)
     strip: str | None = None
-    file: LevelsFile | None = None
+    file: "LevelsFile | None" = None
     makes_levels: bool | None = None
-    has_failed: bool = False
     has_begun: bool = False
-
-
-_running: list[_Film] = []  # at most one
 
 
 def begin(scene: Scene) -> None:
     """Begin the render of an edit, on the main thread."""
     end()
     if render_job.where() is Where.BACKGROUND and scene.sequence_editor is not None:
-        _running.append(_Film(scene.session_uid))
+        job_snapshots.running.feed = _Film(scene.session_uid)
 
 
 def end() -> None:
     """Restore the edit."""
-    while _running:
-        _running.pop().changed.close()
+    film, job_snapshots.running.feed = job_snapshots.running.feed, None
+    if film is not None:
+        film.changed.close()
 
 
 def before_frame(scene: Scene) -> None:
     """Prepare the edit for its current frame."""
-    film = next((film for film in _running if film.scene == scene.session_uid), None)
-    if film is None:
+    film = job_snapshots.running.feed
+    if film is None or film.scene != scene.session_uid:
         return
     if not film.has_begun:  # a single picture can be saved as floats later
         film.has_begun = True
         return
-    seen = None if film.has_failed else _seen(film, scene)
+    seen = _seen(film, scene)
     is_fed = seen is not None and _feed(film, scene, *seen)
     shown = film.strip and scene.sequence_editor.strips_all.get(film.strip)
     if shown and shown.mute == is_fed:  # changes are slow
@@ -109,7 +103,7 @@ def _feed(film: _Film, scene: Scene, strip: Strip, is_blended: bool) -> bool:
         _file(film, scene).write(levels)
         context.session.begin_next(snapshot, frame, context)
     except Exception:
-        film.has_failed = True
+        end()
         return False
     except BaseException as error:  # Ctrl-C, which the engine would not get
         render_job.fail(in_words(error))
@@ -117,7 +111,7 @@ def _feed(film: _Film, scene: Scene, strip: Strip, is_blended: bool) -> bool:
     return True
 
 
-def _file(film: _Film, scene: Scene) -> LevelsFile:
+def _file(film: _Film, scene: Scene) -> "LevelsFile":
     """Return the film's file, with a strip that shows it.
 
     Raises:

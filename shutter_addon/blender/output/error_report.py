@@ -86,9 +86,8 @@ def _edit(scene: Scene | None) -> Iterator[str]:
     all_strips = scene.sequence_editor.strips_all if scene.sequence_editor else ()
     counts = Counter(strip.type for strip in all_strips)
     yield f"- Strips: {', '.join(f'{count} {kind}' for kind, count in sorted(counts.items())) or 'none'}"
-    for strip in strips.effect_strips(scene):
-        if (effect := strips.effect_of(scene, strip.scene)) is not None:
-            yield from _effect(scene, effect, strip)
+    for effect, strip, _source in strips.shown_effects(scene):
+        yield from _effect(scene, effect, strip)
 
 
 def _effect(scene: Scene, effect: PropertyGroup, strip: Strip) -> Iterator[str]:

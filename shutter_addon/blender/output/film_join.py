@@ -1,7 +1,5 @@
 """Joining rendered frames to a movie, with the sound and output settings of their edit."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -104,15 +102,12 @@ def _refuse_transparency(scene: Scene, paths: list[Path], first: RenderedPicture
 
     A film applies the view after composing over black, but the files have it applied to their colours.
     """
-    if paths[0].suffix == ".png" and first.channels in (2, 4) and _changes_transparency(scene):
+    is_shown_otherwise = _shown(scene).view_settings.view_transform != "Standard"
+    if paths[0].suffix == ".png" and first.channels in (2, 4) and is_shown_otherwise:
         for path in paths:
             if rendered_pictures.is_transparent(path):
                 words = "is transparent, which a film shows otherwise under this view"
                 raise OutputError(f"{path}: {words}; render EXR, or without transparency")
-
-
-def _changes_transparency(scene: Scene) -> bool:
-    return _shown(scene).view_settings.view_transform != "Standard"
 
 
 def _shown(scene: Scene) -> Scene | ImageFormatSettings:

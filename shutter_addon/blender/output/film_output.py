@@ -1,15 +1,12 @@
 """Writing films as movies or folders of pictures, each file whole or not at all."""
 
-from __future__ import annotations
-
 import itertools
 import os
 import signal
 import sys
 from collections.abc import Callable, Collection, Iterable, Iterator
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import NamedTuple
 
 import bpy
 from bpy.types import ImageFormatSettings, RenderSettings, Scene
@@ -34,14 +31,7 @@ MOVIES = {
 }
 
 
-class PictureFormat(NamedTuple):
-    """A format: Blender's name and bits per sample."""
-
-    blender: str
-    bits: int
-
-
-FORMATS = {"png": PictureFormat("PNG", 16), "exr": PictureFormat("OPEN_EXR", 32)}
+FORMATS = {"png": ("PNG", "16"), "exr": ("OPEN_EXR", "32")}  # Blender's name and bits per sample
 
 # Metadata about the render itself. A frame's number would have as many digits as the range's last.
 _STAMPS = (
@@ -156,7 +146,7 @@ def set_output(scene: Scene, path: Path, file_format: str, *, alpha: bool) -> No
         render.ffmpeg.audio_codec = audio if _has_sound(scene) else "NONE"
         render.ffmpeg.constant_rate_factor = "HIGH"
         return
-    _set_format(settings, FORMATS[file_format])
+    _set_format(settings, file_format)
     settings.color_mode = "RGBA" if alpha else "RGB"
 
 
@@ -177,7 +167,7 @@ def set_pictures(scene: Scene, file_format: str, note: str) -> None:
     """Set up pictures of a saved edit: all frames, with the edit's colours, and a note in their metadata."""
     settings, render = scene.render.image_settings, scene.render
     settings.media_type = "IMAGE"
-    _set_format(settings, FORMATS[file_format])
+    _set_format(settings, file_format)
     render.use_file_extension = render.use_overwrite = True
     render.use_placeholder = False
     scene.frame_step = 1
@@ -186,9 +176,9 @@ def set_pictures(scene: Scene, file_format: str, note: str) -> None:
         render.use_stamp_note, render.stamp_note_text = True, note
 
 
-def _set_format(settings: ImageFormatSettings, kind: PictureFormat) -> None:
-    settings.file_format, settings.color_depth = kind.blender, str(kind.bits)
-    if kind.blender == "OPEN_EXR":
+def _set_format(settings: ImageFormatSettings, file_format: str) -> None:
+    settings.file_format, settings.color_depth = FORMATS[file_format]
+    if file_format == "exr":
         settings.exr_codec = "ZIP"  # lossless, with checksums that reveal damaged files
 
 
@@ -207,7 +197,10 @@ def render_made_edit(scene: Scene, output: Path) -> None:
         InterruptedRenderError: The same, by Ctrl-C or a farm's TERM.
     """
     make_folder(output.parent if is_movie(output) else output)
-    with progress(scene.frame_end - scene.frame_start + 1, "frame") as moved, _without_sources(scene):
+    # Mute sources, which their effects cover completely. Blender takes Scene strips for transparent: it would decode
+    # the source and blend, 2/5 of its work.
+    hidden = [(each.source, "mute", True) for each in strips.with_sources(scene)]
+    with progress(scene.frame_end - scene.frame_start + 1, "frame") as moved, for_a_while(hidden):
         render_frames(scene, output, moved)
 
 
@@ -223,36 +216,36 @@ def render_frames(scene: Scene, output: Path, moved: Callable[[], None], move: M
     Raises:
         OutputError, InterruptedRenderError: See `render_made_edit`.
     """
-    kept = scene.render.filepath
+    is_film = is_movie(output)
     faults: list[str] = []
-    with atomic_write.part_folder(output.parent if is_movie(output) else output) as part:
+    with atomic_write.part_folder(output.parent if is_film else output) as part:
         part_film = part / f"film{output.suffix}"
+        place = blender_path(str(part_film) if is_film else f"{part}{os.sep}")
         try:
-            scene.render.filepath = blender_path(str(part_film) if is_movie(output) else f"{part}{os.sep}")
             with (
+                for_a_while([(scene.render, "filepath", place)]),
                 render_job.telling(faults.append),
                 stoppable() as stopped,
                 quiet(),
-                _uncached(scene),
+                # Each frame is rendered once, and caches would take gigabytes.
+                for_a_while((scene.sequence_editor, name, False) for name in ("use_cache_raw", "use_cache_final")),
                 _moved(part, output, scene, moved, move) as missing,
             ):
                 bpy.ops.render.render(animation=True, scene=scene.name)
-            if is_movie(output) and not faults and not stopped:
-                count = len(range(scene.frame_start, scene.frame_end + 1, scene.frame_step))
-                if not is_whole_movie(part_film, count):
-                    raise OutputError(f"{output}: could not be written whole ({why_short(part)})")
-                part_film.replace(output)
-            elif missing and not faults and not stopped:
-                raise OutputError(f"{output}: {len(missing)} frames were not written; {why_short(part)}")
         except RuntimeError as error:
             raise OutputError(f"{output}: {message(error)}") from None
-        finally:
-            scene.render.filepath = kept
-        if faults or stopped:
-            rescued = _rescued(part_film, output) if is_movie(output) else ""
-            if faults:
-                raise OutputError(faults[0] + rescued)
+        rescued = _rescued(part_film, output) if is_film and (faults or stopped) else ""
+        if faults:
+            raise OutputError(faults[0] + rescued)
+        if stopped:
             raise InterruptedRenderError(f"{output}: stopped{rescued}")
+        if missing:
+            raise OutputError(f"{output}: {len(missing)} frames were not written; {why_short(part)}")
+        if is_film:
+            count = len(range(scene.frame_start, scene.frame_end + 1, scene.frame_step))
+            if not is_whole_movie(part_film, count):
+                raise OutputError(f"{output}: could not be written whole ({why_short(part)})")
+            part_film.replace(output)
 
 
 def make_folder(folder: Path) -> None:
@@ -293,7 +286,7 @@ def _moved(part: Path, output: Path, scene: Scene, update: Callable[[], None], m
     """
     frames = range(scene.frame_start, scene.frame_end + 1)
     settings = scene.render.image_settings
-    ending = next((name for name, kind in FORMATS.items() if settings.file_format == kind.blender), "")
+    ending = next((name for name, (kind, _bits) in FORMATS.items() if settings.file_format == kind), "")
     missing = {path.name: path for path in pictures_of(output, ending, frames)} if ending else {}
 
     def moved(*_) -> None:
@@ -353,21 +346,6 @@ def stoppable() -> Iterator[list[int]]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler or signal.SIG_DFL)  # None: Blender's own, which Python cannot restore
-
-
-def _uncached(scene: Scene) -> AbstractContextManager[None]:
-    """Turn off Blender's caches: each frame is rendered once, and caches would take gigabytes."""
-    names = ("use_cache_raw", "use_cache_final") if scene.sequence_editor else ()
-    return for_a_while((scene.sequence_editor, name, False) for name in names)
-
-
-def _without_sources(scene: Scene) -> AbstractContextManager[None]:
-    """Mute sources, which their effects cover completely.
-
-    Blender takes Scene strips for transparent: it would decode the source and blend, 2/5 of its work.
-    """
-    sources = [scene.sequence_editor.strips_all[name] for name in strips.shown_sources(scene)]
-    return for_a_while((strip, "mute", True) for strip in sources)
 
 
 @contextmanager

@@ -1,8 +1,6 @@
 """Writing mattes of an effect as pictures: beside its recipe, which needs files for strips and masks, or for other
 programs."""
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Iterator
@@ -24,6 +22,8 @@ from ...media.sequence import sequence_files
 from ..data import matte_content, snapshot, source_media, strips, validation
 from ..rendering import effect_source
 
+EffectStrip = tuple[Scene, PropertyGroup, Strip]
+
 
 def recipe_for(scene: Scene, effect: PropertyGroup, strip: Strip, path: Path) -> Effect:
     """Return an effect as a recipe for a path. Mattes without a file are written beside it, into "NAME mattes".
@@ -32,13 +32,12 @@ def recipe_for(scene: Scene, effect: PropertyGroup, strip: Strip, path: Path) ->
         effect_source.FAULTS: The effect cannot be rendered, or a matte cannot be read or written.
         OSError: The folder cannot be made.
     """
-    regions = strips.matte_regions(effect)
+    regions, shown = _mattes(effect), (scene, effect, strip)
     # Find faults before anything is written.
-    snapshot.recipe_of(scene, effect, strip, [_ramp(region) for region in regions])
+    snapshot.recipe_of(*shown, [_ramp(region) for region in regions])
     folders = [_folder(region, path, number) for number, region in enumerate(regions, 1)]
-    _refuse_overwriting(folders, _read_files(scene, effect, strip, regions))
-    contents = [_content(scene, effect, strip, *both, path) for both in zip(regions, folders, strict=True)]
-    return snapshot.recipe_of(scene, effect, strip, contents)
+    _refuse_overwriting(folders, *shown)
+    return snapshot.recipe_of(*shown, [_content(shown, *both, path) for both in zip(regions, folders, strict=True)])
 
 
 def save(scene: Scene, effect: PropertyGroup, strip: Strip, region: PropertyGroup, folder: Path, suffix: str) -> int:
@@ -50,8 +49,12 @@ def save(scene: Scene, effect: PropertyGroup, strip: Strip, region: PropertyGrou
         effect_source.FAULTS: The matte cannot be read, or the pictures cannot be written.
         OSError: Their folder cannot be written to.
     """
-    _refuse_overwriting([folder], _read_files(scene, effect, strip, strips.matte_regions(effect)))
-    return _write(scene, effect, strip, region, folder, strip.left_handle, suffix)
+    _refuse_overwriting([folder], scene, effect, strip)
+    return _write((scene, effect, strip), region, folder, strip.left_handle, suffix)
+
+
+def _mattes(effect: PropertyGroup) -> list:
+    return [region for region in strips.used_regions(effect) if region.kind in strips.MATTES]
 
 
 def _ramp(region: PropertyGroup) -> RampContent:
@@ -73,63 +76,53 @@ def _is_one_of_many(region: PropertyGroup) -> bool:
     return region.image.source == "FILE" and path.exists() and len(sequence_files(path)) > 1
 
 
-def _read_files(scene: Scene, effect: PropertyGroup, strip: Strip, regions: list) -> Iterator[Path]:
+def _read_files(scene: Scene, effect: PropertyGroup, strip: Strip) -> Iterator[Path]:
     """Yield a file of each medium that the effect's mattes and source read."""
     yield source_media.spec(strips.source_of(scene, effect, strip)).path
-    for region in regions:
+    for region in _mattes(effect):
         if region.kind == "MATTE" and region.matte == "IMAGE":
             yield matte_content.image_path(region)
         elif region.kind == "MATTE" and region.matte == "STRIP":
             yield from (source_media.spec(part).path for part in matte_content.parts_for(region, strip))
 
 
-def _refuse_overwriting(folders: list[Path | None], read: Iterator[Path]) -> None:
-    """Raise EffectError if pictures would be written where others are read."""
-    taken = {file.parent.resolve() for file in read}
+def _refuse_overwriting(folders: list[Path | None], *shown: Any) -> None:
+    """Raise EffectError if pictures would be written where the effect reads others. `shown` is as in _read_files."""
+    taken = {file.parent.resolve() for file in _read_files(*shown)}
     for folder in folders:
         if folder is not None and folder.resolve() in taken:
             sentence = rpt_("{folder}: its pictures are read by the effect; choose another name for the recipe")
             raise EffectError(sentence.format(folder=folder))
 
 
-def _content(
-    scene: Scene, effect: PropertyGroup, strip: Strip, region: PropertyGroup, folder: Path | None, path: Path
-) -> FileContent | RampContent:
+def _content(shown: EffectStrip, region: PropertyGroup, folder: Path | None, path: Path) -> FileContent | RampContent:
     if region.kind == "RAMP":
         return _ramp(region)
     if folder is not None:
-        _write(scene, effect, strip, region, folder, 1)
+        _write(shown, region, folder, 1)
         return FileContent(path=recipe.relative(folder / "0001.png", path.parent), timing="timeline")
     file, channel = matte_content.image_path(region), matte_content.channel(region)
     # A recipe's timeline begins with the trimmed strip.
-    offset = region.offset + (strips.skipped(strip) if region.timing == "TIMELINE" else 0)
+    offset = region.offset + (strips.skipped(shown[2]) if region.timing == "TIMELINE" else 0)
     named = recipe.relative(file, path.parent)
     return FileContent(path=named, channel=channel, offset=offset, timing=region.timing.lower())
 
 
-def _write(
-    scene: Scene,
-    effect: PropertyGroup,
-    strip: Strip,
-    region: PropertyGroup,
-    folder: Path,
-    first: int,
-    suffix: str = "png",
-) -> int:
+def _write(shown: EffectStrip, region: PropertyGroup, folder: Path, first: int, suffix: str = "png") -> int:
     """Write a matte at each timeline frame of the effect strip, numbered from `first`, all or none."""
     folder.mkdir(parents=True, exist_ok=True)
-    frames = range(strip.left_handle, strip.right_handle)
-    shown = snapshot.take(scene, effect, strip, frames)
-    content = snapshot.matte_content_at(scene, effect, strip, list(effect.regions).index(region), frames)
+    frames = range(shown[2].left_handle, shown[2].right_handle)
+    taken = snapshot.take(*shown, frames)
+    written: Any = taken.effect.regions[strips.used_regions(shown[1]).index(region)]
     with (
         atomic_write.part_folder(folder) as part,
-        closing(effect_source.open_source(shown)) as source,
+        closing(effect_source.open_source(taken)) as source,
         closing(MatteValues.of(source)) as values,
     ):
-        clip = effect_source.clip_of(shown, source)
+        clip = effect_source.clip_of(taken, source)
         for number, frame in enumerate(frames, first):
             with translated(rpt_):
-                matte = mattes.Matte(shutter=0, content=content.at(frame))
+                matte = mattes.Matte(shutter=0, content=written.content.at(frame))
             ((_key, array),) = values.values((matte,), clip.shown(frame).source_frame, 1)
             place = part / f"{number:04d}.{suffix}"
             if suffix == "exr":

@@ -1,7 +1,5 @@
 """Rendering frames of a saved edit into a folder that several machines share, each frame once."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from functools import partial
@@ -18,7 +16,6 @@ from ..rendering import render_job
 from . import film_output
 
 RUN = 8  # frames per claim of a machine
-Stamps = dict[Path, tuple | None]  # rendered_pictures.stamp of pictures
 _PAUSE = 1.0  # seconds between checks of what others have finished
 
 
@@ -30,8 +27,7 @@ def check(folder: Path, file_format: str | None, frames: range, read: list[Path]
         read: Files that must not be overwritten.
     """
     if film_output.is_movie(folder):
-        words = "a saved edit is rendered to a folder of pictures, not to a movie"
-        raise film_output.OutputError(f"{folder}: {words}")
+        raise film_output.OutputError(f"{folder}: a saved edit is rendered to a folder of pictures, not to a movie")
     film_output.check_folder(folder, file_format)
     film_output.blender_path(str(folder))
     film_output.refuse_overwriting(film_output.pictures_of(folder, file_format or "png", frames), read)
@@ -40,8 +36,8 @@ def check(folder: Path, file_format: str | None, frames: range, read: list[Path]
 def check_resumable(scene: Scene) -> None:
     """Raise OutputError if pictures cannot carry the edit's version."""
     if scene.render.use_stamp:
-        words = "the edit burns metadata into its pictures, so that they carry no version; turn Burn Into Image off"
-        raise film_output.OutputError(f"--resume: {words}")
+        why = "the edit burns metadata into its pictures, so that they carry no version; turn Burn Into Image off"
+        raise film_output.OutputError(f"--resume: {why}")
 
 
 def render(scene: Scene, folder: Path, file_format: str, version: EditVersion, *, resume: bool) -> None:
@@ -58,7 +54,6 @@ def render(scene: Scene, folder: Path, file_format: str, version: EditVersion, *
         check_resumable(scene)
     film_output.set_pictures(scene, file_format, job_file.note(version.key))
     film_output.make_folder(folder)
-    is_finished = partial(_is_finished, version.key, {})
     frames = range(scene.frame_start, scene.frame_end + 1)
     pictures = dict(zip(frames, film_output.pictures_of(folder, file_format, frames), strict=True))
 
@@ -69,33 +64,27 @@ def render(scene: Scene, folder: Path, file_format: str, version: EditVersion, *
     with film_output.progress(len(pictures), "frame") as moved:
         write = partial(film_output.render_frames, scene, folder, moved, move)
         if resume:
-            _render_missing(scene, folder, pictures, is_finished, write, moved)
+            _render_missing(scene, folder, pictures, version.key, write, moved)
         else:
             write()
 
 
 def _render_missing(
-    scene: Scene, folder: Path, pictures: dict[int, Path], is_finished: Callable, write: Callable, moved: Callable
+    scene: Scene, folder: Path, missing: dict[int, Path], key: str, write: Callable, moved: Callable
 ) -> None:
-    missing, waits = dict(pictures), False
+    waits = False
     with Claims(folder) as claims, film_output.stoppable() as stopped:
-        while True:
-            for frame in [frame for frame, picture in missing.items() if is_finished(picture)]:
-                del missing[frame]
-                moved()
-            if not missing:
-                break
+        while missing:
             if stopped:
                 raise film_output.InterruptedRenderError(f"{folder}: stopped")
-            if run := _claim_run(claims, missing, is_finished):
+            if run := _claim_run(claims, missing, key, moved):
                 scene.frame_start, scene.frame_end = min(run), max(run)
                 try:
                     write()
                 finally:
-                    for picture in run.values():
-                        claims.release(_name(picture))
-                missing = {frame: picture for frame, picture in missing.items() if frame not in run}
-            else:
+                    for frame in run:
+                        claims.release(_name(missing.pop(frame)))
+            elif missing:
                 if not waits:
                     awaited = frame_ranges.in_words(list(missing))
                     words = f"{folder}: waiting for {awaited}, which other workers have claimed"
@@ -104,15 +93,21 @@ def _render_missing(
                 time.sleep(_PAUSE)
 
 
-def _claim_run(claims: Claims, missing: dict[int, Path], is_finished: Callable) -> dict[int, Path]:
-    """Claim the first missing frames without a gap. Return them; empty if others have claimed all."""
-    run: dict[int, Path] = {}
-    for frame, picture in missing.items():
-        if len(run) == RUN or (run and frame - 1 not in run):
+def _claim_run(claims: Claims, missing: dict[int, Path], key: str, moved: Callable) -> list[int]:
+    """Claim the first missing frames without a gap. Return them; empty if others have claimed all.
+
+    Frames before these that are finished are no longer missing.
+    """
+    run: list[int] = []
+    for frame, picture in list(missing.items()):
+        if len(run) == RUN or (run and frame - 1 != run[-1]):
             break
-        if claims.take(_name(picture)):
-            if not is_finished(picture):  # since the last check
-                run[frame] = picture
+        if _is_finished(picture, key):
+            del missing[frame]
+            moved()
+        elif claims.take(_name(picture)):
+            if not _is_finished(picture, key):  # since the last look
+                run.append(frame)
                 continue
             claims.release(_name(picture))
         if run:
@@ -125,16 +120,6 @@ def _name(picture: Path) -> str:
     return f"{picture.stem}_{picture.suffix[1:]}"
 
 
-def _is_finished(key: str, rejected: Stamps, picture: Path) -> bool:
-    """Return whether a picture is undamaged and of this version of the edit.
-
-    Args:
-        rejected: Stamps of pictures that were not, which are not read again; this function adds to them.
-    """
-    stamp = rendered_pictures.stamp(picture) if picture.is_file() else None  # opening a pipe would wait forever
-    if stamp is None or rejected.get(picture) == stamp:
-        return False
-    if rendered_pictures.read(picture, key) is not None:
-        return True
-    rejected[picture] = stamp
-    return False
+def _is_finished(picture: Path, key: str) -> bool:
+    """Return whether a picture is undamaged and of this version of the edit."""
+    return rendered_pictures.read(picture, key) is not None

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from typing import Any
 
 import bpy
 import numpy as np
@@ -35,12 +36,14 @@ class _Film:
         read: Of a film in the background, by effect scene and strip; None: it was read once, for one frame.
         pictures: Of a job: the last ones, shown until the next are made.
         left_out: Of a job: see requirements.left_out.
+        feed: Of a film in the background: its file of levels (output.edit_feed), or None.
     """
 
     taken: dict[int, list[tuple[range, Snapshot]] | Exception] = field(default_factory=dict)
     read: dict[tuple[int, str], Snapshot | None] = field(default_factory=dict)
     pictures: dict[int, np.ndarray] = field(default_factory=dict)
     left_out: list[tuple[range, str]] = field(default_factory=list)
+    feed: Any = None
 
 
 running = _Film()

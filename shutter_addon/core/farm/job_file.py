@@ -1,8 +1,6 @@
 """The version of an edit, which marks its pictures on any machine, and the job file beside the pictures, which keeps
 machines from rendering different versions into one folder."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re
