@@ -1,7 +1,7 @@
 """Footage: movies through PyAV, image sequences through OpenImageIO, cuts, tracking, optical flow. No bpy."""
 
 from ..core.frames.frame_source import FrameSource
-from .errors import MediaError
+from ..core.messages import MediaError
 from .opening import open_source
 from .prefetch import PrefetchSource
 from .sequence import SequenceSource

@@ -20,7 +20,7 @@ import numpy as np
 
 from ..core import threads
 from ..core.frames.frame_source import FrameSource
-from .errors import MediaError
+from ..core.messages import MediaError
 from .files import OTHER, check_file, check_index, check_name, check_size, is_other
 
 ANSWER = "Virtual Shutter decodes"  # the beginning of an answer's line, since Blender prints other lines as well

@@ -21,10 +21,10 @@ from OpenImageIO import ImageSpec
 from ..core import stopping
 from ..core.farm.claims import Claims
 from ..core.frames.frame_source import FrameSource, SourceWrapper
+from ..core.messages import MediaError
 from ..core.model import outlines, scribbles
 from . import carrying, derived, flow, opencv
 from .cuts import ShotSource
-from .errors import MediaError
 from .image_writing import write_levels
 from .outlining import traced
 

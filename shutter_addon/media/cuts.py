@@ -12,7 +12,7 @@ from ..core.frames import light
 from ..core.frames.frame_source import FrameSource, SourceWrapper
 from ..core.frames.planes import Decoded, Moment, Planes, as_rgba
 from ..core.memo import Kept
-from .errors import MediaError
+from ..core.messages import MediaError
 
 # Frames on each side that decide about a cut. A film animated on threes has as many pictures there as PySceneDetect
 # compares.

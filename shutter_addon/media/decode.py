@@ -18,7 +18,7 @@ from av.video.frame import PictureType
 from av.video.reformatter import ColorRange
 from av.video.stream import VideoStream
 
-from .errors import MediaError
+from ..core.messages import MediaError
 from .files import FOREIGN, OTHER, is_other
 
 if TYPE_CHECKING:

@@ -20,8 +20,8 @@ from OpenImageIO import ImageInput, ImageSpec, geterror
 from ..core import atomic_write
 from ..core.frames.frame_source import FrameSource
 from ..core.frames.planes import STEP
+from ..core.messages import MediaError
 from . import flow
-from .errors import MediaError
 from .files import check_name
 from .image_writing import write_exr
 

@@ -5,7 +5,7 @@ from functools import cache
 from pathlib import Path
 
 from ..core.frames.frame_source import FrameSource
-from .errors import MediaError
+from ..core.messages import MediaError
 
 PIXELS = 1 << 28  # 16384×16384, FFmpeg's limit; a damaged header may claim any size
 OTHER = "is no file, but a pipe, a socket or a device"

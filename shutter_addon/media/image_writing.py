@@ -7,7 +7,7 @@ import numpy as np
 import OpenImageIO
 
 from ..core import atomic_write
-from .errors import MediaError
+from ..core.messages import MediaError
 from .files import check_name
 from .rendered_pictures import UNKNOWN, why_short
 

@@ -21,8 +21,8 @@ from numpy.typing import DTypeLike
 
 from ..core.frames.frame_source import FrameSource
 from ..core.frames.planes import Decoded, Matrix, Planes, as_rgba, matrix
+from ..core.messages import MediaError
 from .decode import FrameReader, fraction, reason
-from .errors import MediaError
 from .files import check_file, check_index
 from .reduced import reduced, reduced_size
 

@@ -11,9 +11,9 @@ import numpy as np
 
 from ..core.frames.frame_source import FrameSource, SourceWrapper
 from ..core.frames.light import REC709
+from ..core.messages import MediaError
 from .blender_movie import BlenderMovie, is_lent
 from .color import in_colorspace
-from .errors import MediaError
 from .files import check_file, pyav_missing
 from .reduced import ProxySource, fits, smaller
 from .sequence import CHANNELS, IMAGE_SUFFIXES, SequenceChannel, SequenceSource, no_channel

@@ -13,8 +13,8 @@ import numpy as np
 
 from ..core import stopping
 from ..core.frames.frame_source import FrameSource
+from ..core.messages import MediaError
 from . import flow, opencv
-from .errors import MediaError
 from .opencv import cv2
 
 ROWS = 540  # the most rows of the pictures

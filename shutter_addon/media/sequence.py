@@ -11,7 +11,7 @@ import numpy as np
 from OpenImageIO import ImageInput, ImageSpec, geterror
 
 from ..core.frames.frame_source import FrameSource
-from .errors import MediaError
+from ..core.messages import MediaError
 from .files import FOREIGN, check_file, check_index, check_name, check_size, stamp
 
 # The channels that every picture has, whatever their names in the file.

@@ -14,12 +14,12 @@ import numpy as np
 from ..core.frames.frame_source import FrameSource, SourceWrapper
 from ..core.frames.planes import Decoded, Moment, as_rgba
 from ..core.memo import Kept
+from ..core.messages import MediaError
 from ..core.model.motions import Similarity
 from ..core.model.shutters import MAX_WINDOW
 from . import flow, opencv, steps
 from .cuts import may_be_cut
 from .derived import StoredVectors
-from .errors import MediaError
 from .files import check_index
 
 SMOOTH = 1, 2, 4, 8, 16  # moments from a filmed frame to the next

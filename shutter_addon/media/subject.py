@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from ..core import stopping
+from ..core.messages import MediaError
 from ..core.model import scribbles
 from . import carrying, derived, flow, opencv
-from .errors import MediaError
 from .opencv import cv2
 
 MODEL = Path(__file__).resolve().parents[2] / "models" / "u2netp.onnx"

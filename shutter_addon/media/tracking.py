@@ -11,11 +11,11 @@ from typing import Protocol
 
 import numpy as np
 
+from ..core.messages import MediaError
 from ..core.model import motions, scribbles
 from ..core.model.effect import Region, Subject
 from ..core.model.motions import Motion, Placement, Similarity
 from . import registration
-from .errors import MediaError
 from .footage import Footage
 from .pursuit import PartPursuit, Sighting, distinctness
 from .registration import Part

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from shutter_addon.core.frames.light import to_encoded, to_linear
+from shutter_addon.core.messages import MediaError
 from shutter_addon.core.model import outlines
 from shutter_addon.core.model.mattes import FileFrame, Matte
 from shutter_addon.media import carried_mattes, carrying, matte_tracking, outlining
-from shutter_addon.media.errors import MediaError
 from shutter_addon.media.matte_values import MatteValues
 
 WIDTH, HEIGHT, COUNT = 192, 128, 14

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from test_carrying import Footage
 
+from shutter_addon.core.messages import MediaError
 from shutter_addon.core.model import outlines
 from shutter_addon.media import subject_mattes
-from shutter_addon.media.errors import MediaError
 from shutter_addon.media.subject import MODEL, Network
 from shutter_addon.media.subject_mattes import Subject, SubjectFile
 
