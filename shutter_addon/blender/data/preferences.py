@@ -7,7 +7,7 @@ from bpy.props import EnumProperty, IntProperty, StringProperty
 from bpy.types import Context
 
 from ...core.model.choices import CONTEXT
-from ...media.subject import model_path
+from ...media.subject import MODEL
 from . import strips
 
 ADDON = __package__.rpartition(".shutter_addon")[0] or "shutter_addon"
@@ -74,7 +74,8 @@ def gpu_memory() -> int:
 def model() -> Path:
     """The file of the model that finds subjects."""
     preferences = _preferences()
-    return model_path(bpy.path.abspath(preferences.model) if preferences else "")
+    chosen = preferences.model if preferences else ""
+    return Path(bpy.path.abspath(chosen)).expanduser() if chosen else MODEL
 
 
 def _preferences() -> ShutterPreferences | None:

@@ -25,9 +25,7 @@ from ...core.model import following, keyframes, limits, mattes, outlines
 from ...core.model.fields import fields_of
 from ...core.model.frame_state import Options
 from ...core.recipes import baking
-from ...media.carried_mattes import CarriedFile
-from ...media.subject import WIDTH
-from ...media.subject_mattes import Subject, SubjectFile
+from ...media.subject_mattes import CarriedFile, Subject
 from . import matte_content, preferences, sampled, source_media, strips, validation
 from .annotations import LAYERS, image_to_picture, layer_of, layers_of, picture_size
 from .fcurves import curves_under, key_frames, leading, progress, stretched
@@ -201,7 +199,7 @@ def matte_content_at(
 
 def carried_outline(
     scene: Scene, effect: PropertyGroup, strip: Strip, index: int, frames: Frames
-) -> tuple[CarriedFile | SubjectFile, dict[float, int]]:
+) -> tuple[CarriedFile, dict[float, int]]:
     """Return the file of a tracked outline's or a subject's mattes, and the filmed frames that timeline frames show.
 
     Raises:
@@ -353,11 +351,11 @@ def _carried(sampling: Sampling, drawings: model.Drawings) -> CarriedFile:
     return CarriedFile(**matte_content.tracked(sampling), drawings=tuple(sorted(drawn.items())))
 
 
-def _subject_file(sampling: Sampling, *marks: model.Drawings) -> SubjectFile:
+def _subject_file(sampling: Sampling, *marks: model.Drawings) -> CarriedFile:
     """Return the file that gives a subject's mattes. `marks` are from _marks."""
     strokes, nots, drawn = (_by_source_frame(sampling, each) for each in marks)
-    subject, drawings = Subject(strokes=strokes, nots=nots, width=WIDTH), tuple(sorted(drawn.items()))
-    return SubjectFile(**matte_content.tracked(sampling), subject=subject, drawings=drawings, model=preferences.model())
+    subject, drawings = Subject(strokes=strokes, nots=nots), tuple(sorted(drawn.items()))
+    return CarriedFile(**matte_content.tracked(sampling), subject=subject, drawings=drawings, model=preferences.model())
 
 
 def _marks(sampling: Sampling, index: int) -> dict[str, model.Drawings]:
