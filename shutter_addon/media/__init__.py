@@ -4,6 +4,5 @@ from ..core.frames.frame_source import FrameSource
 from ..core.messages import MediaError
 from .opening import open_source
 from .prefetch import PrefetchSource
-from .sequence import SequenceSource
 
-__all__ = ["FrameSource", "MediaError", "PrefetchSource", "SequenceSource", "open_source"]
+__all__ = ["FrameSource", "MediaError", "PrefetchSource", "open_source"]

@@ -16,7 +16,7 @@ from .blender_movie import BlenderMovie, is_lent
 from .color import in_colorspace
 from .files import check_file, pyav_missing
 from .reduced import ProxySource, fits, smaller
-from .sequence import CHANNELS, IMAGE_SUFFIXES, SequenceChannel, SequenceSource, no_channel
+from .sequence import CHANNELS, IMAGE_SUFFIXES, SequenceSource, no_channel
 
 
 def open_source(
@@ -73,28 +73,6 @@ def with_proxy(source: FrameSource, opened: Callable[[], FrameSource]) -> FrameS
         return ProxySource(source, proxy)
     proxy.close()
     return source
-
-
-def open_channel(
-    path: str | Path, channel: str, *, files: Sequence[str | Path] | None = None, stream: int = 0
-) -> FrameSource:
-    """Open one channel of a movie or of an image sequence.
-
-    Args:
-        path: the file
-        channel: one of sequence.CHANNELS, or the name of a channel in the images
-        files: as for open_source
-        stream: as for open_source
-
-    Raises:
-        MediaError: it cannot be read, or has no such channel
-    """
-    path = Path(path)
-    if not _is_movie(path, files):
-        return SequenceChannel(path, channel, files=files)
-    if channel not in CHANNELS:
-        raise no_channel(check_file(path), channel, CHANNELS)
-    return movie_channel(_opened_movie(path, stream), channel)
 
 
 def _is_movie(path: Path, files: Sequence[str | Path] | None) -> bool:
@@ -159,8 +137,14 @@ class MatteFile:
         Raises:
             MediaError: it cannot be read, or has no such channel
         """
-        channel = open_channel(self.path, self.channel, files=self.files, stream=self.stream)
-        return SourceWrapper(channel, lambda index: _values(channel.read(min(max(index, 0), channel.count - 1))))
+        source: FrameSource
+        if not _is_movie(self.path, self.files):
+            source = SequenceSource(self.path, channel=self.channel, files=self.files)
+        elif self.channel in CHANNELS:
+            source = movie_channel(_opened_movie(self.path, self.stream), self.channel)
+        else:
+            raise no_channel(check_file(self.path), self.channel, CHANNELS)
+        return SourceWrapper(source, lambda index: _values(source.read(min(max(index, 0), source.count - 1))))
 
 
 def _values(samples: np.ndarray) -> np.ndarray:
