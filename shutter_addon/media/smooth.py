@@ -63,7 +63,7 @@ class Repeats:
     def _change(self, index: int) -> float:
         """By how many levels a frame differs from the one before; infinitely where that is none, or of another shot;
         "not a number" where that cannot be told."""
-        if index == 0:
+        if index in (0, self._source.count):
             return math.inf
         try:
             return self._changes.ask(index, lambda: self._found(index), _CHANGES)
@@ -71,8 +71,6 @@ class Repeats:
             return math.nan
 
     def _found(self, index: int) -> float:
-        if index == self._source.count:
-            return math.inf
         before, after = self._picture(index - 1), self._picture(index)
         if may_be_cut(*(np.dstack([picture] * 3) for picture in (before, after))):
             return math.inf
@@ -100,7 +98,7 @@ class SmoothSource(SourceWrapper):
     ) -> None:
         self._recent = lru_cache(_FRAMES)(source.read)
         super().__init__(SourceWrapper(source, self._recent))
-        flow.check()
+        opencv.check("moments between frames need")
         self._find = flow.found if vectors is None else vectors.found
         self.step = step
         self.count = (source.count - 1) * step + 1
