@@ -3,9 +3,10 @@ a movie, of an image sequence or of a picture, as values 0 … 1."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -58,15 +59,16 @@ def open_source(
         raise
 
 
-def with_proxy(source: FrameSource, opened: Callable[[], FrameSource]) -> FrameSource:
-    """Return a source that reads the frames from a proxy, or the source itself if no proxy fits.
+def with_proxy(source: FrameSource, path: Path, **how: Any) -> FrameSource:
+    """Return a source that reads the frames from a proxy, or the source itself if the proxy does not fit.
 
     Args:
         source: the footage
-        opened: returns the proxy, or raises MediaError
+        path: the proxy's
+        how: arguments of open_source
     """
     try:
-        proxy = opened()
+        proxy = open_source(path, **how)
     except MediaError:
         return source
     if fits(proxy, source):
