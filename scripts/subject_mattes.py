@@ -22,9 +22,8 @@ from carried_mattes import overlap
 
 from shutter_addon.media import open_source
 from shutter_addon.media.opening import MatteFile
+from shutter_addon.media.subject import MODEL
 from shutter_addon.media.subject_mattes import Subject, SubjectMattes
-
-WIDTH = 0.01  # of the stroke
 
 
 def stroke_in(mask: np.ndarray) -> np.ndarray:
@@ -39,7 +38,7 @@ def measure(path: str, frame: int, stroke: np.ndarray, masks: list[np.ndarray]) 
     """Follow a subject through a source and print what comes out."""
     found = []
     with tempfile.TemporaryDirectory() as folder, open_source(path) as source:
-        mattes = SubjectMattes(source, Subject({frame: [stroke]}, {}, WIDTH), (), Path(folder))
+        mattes = SubjectMattes(source, (), Path(folder), Subject({frame: [stroke]}, {}), MODEL)
         start = time.process_time()
         for index in range(source.count):
             matte, sure = mattes.read(index), mattes.confidence(index)

@@ -35,6 +35,10 @@ class EffectError(UserError, RuntimeError):
         self.template, self.words = template, words
 
 
+class MediaError(UserError):
+    """An error of a file: a sentence for the user that names the file."""
+
+
 @contextmanager
 def translated(translate: Callable[[str], str]) -> Iterator[None]:
     """In this context, raise EffectErrors in the user's language; `translate` translates templates."""

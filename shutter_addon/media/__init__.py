@@ -1,9 +1,8 @@
 """Footage: movies through PyAV, image sequences through OpenImageIO, cuts, tracking, optical flow. No bpy."""
 
 from ..core.frames.frame_source import FrameSource
-from .errors import MediaError
+from ..core.messages import MediaError
 from .opening import open_source
 from .prefetch import PrefetchSource
-from .sequence import SequenceSource
 
-__all__ = ["FrameSource", "MediaError", "PrefetchSource", "SequenceSource", "open_source"]
+__all__ = ["FrameSource", "MediaError", "PrefetchSource", "open_source"]

@@ -10,7 +10,7 @@ import math
 import subprocess
 import threading
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
@@ -20,16 +20,13 @@ import numpy as np
 
 from ..core import threads
 from ..core.frames.frame_source import FrameSource
-from .errors import MediaError
-from .files import OTHER, check_file, check_index, check_name, check_size, is_other
+from ..core.messages import MediaError
+from .files import check_file, check_index, check_name, check_size
 
 ANSWER = "Virtual Shutter decodes"  # the beginning of an answer's line, since Blender prints other lines as well
-STARTING = 60  # seconds after which a process is killed if it does not start
-ANSWERING = 120  # seconds after which it is killed if it does not answer; no frame takes as long
+ANSWERING = 120  # seconds after which a process is killed if it does not answer; no frame takes as long
 ENDING = 5  # seconds after which it is killed if it does not end
 _PIPE = 1 << 20  # the pipe's bytes, if they can be set; with 64 KB a frame takes twice as long
-
-_FLOAT_ERROR = 2**-23  # the relative error of Blender's floats
 
 
 @dataclass
@@ -86,8 +83,6 @@ class BlenderMovie(FrameSource):
     def read(self, index: int) -> np.ndarray:
         check_index(self, index)
         try:
-            if is_other(self.path):  # the file may have been replaced
-                raise MediaError(OTHER)
             _, frame = ask(self._known | {"wanted": index})
         except MediaError as error:
             raise MediaError(f"frame {index} of {self.path.name} cannot be decoded: {error}") from None
@@ -100,11 +95,9 @@ class BlenderMovie(FrameSource):
 
 
 def frame_rate(number: float) -> Fraction:
-    """Return the frame rate of Blender's float: a whole number, such a number · 1000/1001, or the nearest fraction."""
-    for rate in (Fraction(round(number)), Fraction(round(number * 1.001) * 1000, 1001)):
-        if rate and abs(float(rate) / number - 1) <= _FLOAT_ERROR:
-            return rate
-    return Fraction(number).limit_denominator(1000) or Fraction(1, 1000)
+    """Return the frame rate of Blender's float: a whole number by a factor such as 1.001, or the nearest fraction."""
+    whole = round(number * 1.0005)
+    return whole / Fraction(whole / number).limit_denominator(1000) if whole else Fraction(number)
 
 
 def lend(command: list[str] | None) -> None:
@@ -114,13 +107,9 @@ def lend(command: list[str] | None) -> None:
         command: gets ANSWER as its last argument. None: movies cannot be decoded this way.
     """
     _decoder.command = command
-    if _decoder.asking.acquire(timeout=ENDING):
-        try:
+    if (process := _decoder.process) is not None:
+        with _killed_after(ENDING, process), _decoder.asking:  # which a thread may hold that waits for an answer
             _end()
-        finally:
-            _decoder.asking.release()
-    elif (process := _decoder.process) is not None:
-        process.kill()  # the waiting thread notices the closed pipe and ends the process
 
 
 def is_lent() -> bool:
@@ -146,23 +135,37 @@ def tell(wanted: dict) -> None:
 
 def _answer(wanted: dict) -> tuple[dict, np.ndarray | None] | None:
     """Return the answer, or None if the process has ended or was killed because it did not answer."""
-    is_new = _decoder.process is None
+    process = _decoder.process or _started()
     try:
-        asked = threads.start(_asked, _decoder.process or _started(), json.dumps(wanted).encode() + b"\n")
-        return asked.result(STARTING if is_new else ANSWERING)
+        with _killed_after(ANSWERING, process):
+            return _asked(process, json.dumps(wanted).encode() + b"\n")
     except MediaError:
         raise
     except BaseException as error:  # such as an interrupt: its late answer would be taken for the next one
         _end()
-        if is_new and isinstance(error, TimeoutError):
-            raise MediaError(f"the Blender that decodes it is not ready after {STARTING} seconds") from None
         if isinstance(error, (EOFError, OSError, ValueError)):
             return None
         raise
 
 
+@contextmanager
+def _killed_after(seconds: float, process: subprocess.Popen[bytes]) -> Iterator[None]:
+    """Kill the process if this context lasts longer. Pipes have no timeout."""
+    ended = threading.Event()
+
+    def watch() -> None:
+        if not ended.wait(seconds):
+            process.kill()
+
+    threads.daemon(watch)
+    try:
+        yield
+    finally:
+        ended.set()
+
+
 def _asked(process: subprocess.Popen[bytes], question: bytes) -> tuple[dict, np.ndarray | None]:
-    """Ask on a thread, since Windows has no timeout for pipes; raise EOFError if the process ends before it answers."""
+    """Ask the process; raise EOFError if it ends before it answers."""
     assert process.stdin is not None
     assert process.stdout is not None
     process.stdin.write(question)
@@ -212,15 +215,6 @@ def _started() -> subprocess.Popen[bytes]:
 
 def _end() -> None:
     process, _decoder.process = _decoder.process, None
-    if process is None:
-        return
-    assert process.stdin is not None
-    assert process.stdout is not None
-    with suppress(OSError):  # flushing fails if the process has ended
-        process.stdin.close()
-    try:
-        process.wait(ENDING)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
-    process.stdout.close()
+    if process is not None:
+        with _killed_after(ENDING, process), suppress(OSError), process:  # closes its pipes and waits for its end
+            pass

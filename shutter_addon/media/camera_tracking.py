@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -75,20 +76,16 @@ class CameraTrack(tracking.Track):
     def _next_begin(self, frames: range) -> int | None:
         """Return the first frame that can be compared with the next one, or that is the last of its shot."""
         self._footage.want(frames)
-        for frame, after in zip(frames, [*frames[1:], None], strict=True):
-            if not self._has_part(frame):
-                continue
-            if after is None or self._cut(frame, after):
-                return frame
-            if self._pursuit(frame)[0].next(after) is not None:
-                return frame
+        for frame, after in zip(frames, [*frames[1:], frames[-1]], strict=True):
+            with suppress(TrackingError):
+                found, _worth = self._pursuit(frame)
+                self._footage.picture(after)  # frames are read in order before cuts are looked for
+                if self._footage.cut(frame, after) or found.next(after) is not None:
+                    return frame
         return None
 
-    def _cut(self, frame: int, after: int) -> bool:
-        self._footage.picture(after)  # frames are read in order before cuts are looked for
-        return self._footage.cut(frame, after)
-
-    def _part(self, frame: int) -> tuple[Part, float]:
+    def _part(self, frame: int) -> Part:
+        """Return what stands still in a frame; raise TrackingError if that is too little."""
         width, height = self._footage.size
         shapes = [region.at(frame) for region in self._regions]
         shapes = [replace(shape, shutter=0) for shape in shapes if shape.opacity]
@@ -99,23 +96,27 @@ class CameraTrack(tracking.Track):
         part = Part(self._footage.picture(frame), free.astype(np.float32))
         if len(part.points) < registration.FEWEST[self._motion]:
             raise TrackingError(BARE)
-        return part, 1.0
+        return part
 
     def _pursuit(self, start: int) -> tuple[_Pursuit, float]:
-        worth = pursuit.distinctness(self.part(start)[0], self._footage.size[0])
-        return _Pursuit(lambda frame: self._part(frame)[0], self._footage, start, self._motion), worth
+        found = _Pursuit(self._part, self._footage, start, self._motion)
+        return found, pursuit.distinctness(found.anchor[0], self._footage.size[0])
 
 
 class _Pursuit:
-    """The camera's motion from one frame to the next ones."""
+    """The camera's motion from one frame to the next ones.
+
+    Attributes:
+        anchor: the part that frames are compared with, its frame, and the motion from the first frame to it
+    """
 
     reason = UNLIKE
 
     def __init__(self, part_at: Callable[[int], Part], footage: Footage, frame: int, motion: Motion) -> None:
         """Start at a frame. part_at: returns what stands still in a frame, or raises TrackingError."""
         self._part_at, self._footage, self._motion = part_at, footage, motion
-        self._anchor = part_at(frame), frame, Similarity()  # with the motion from the first frame to it
-        self._older = deque([self._anchor], 2)  # anchors from some time ago
+        self.anchor = part_at(frame), frame, Similarity()
+        self._older = deque([self.anchor], 2)  # anchors from some time ago
         self._doubt = 0.0  # whether a motion explains the picture
         self._last = frame, Similarity()  # the last frame with a motion
         self._speed = Similarity()
@@ -123,11 +124,11 @@ class _Pursuit:
     def next(self, frame: int) -> Sighting | None:
         """Return the motion to a frame, or None if it is not found."""
         picture, (before, known) = self._footage.picture(frame), self._last
-        sighting = self._compared(picture, self._anchor)
-        if sighting.confidence < _ANEW and before != self._anchor[1] and (anchor := self._anchor_at(before, known)):
+        sighting = self._compared(picture, self.anchor)
+        if sighting.confidence < _ANEW and before != self.anchor[1] and (anchor := self._anchor_at(before, known)):
             anew = self._compared(picture, anchor)
             if anew.confidence > sighting.confidence:
-                self._anchor, sighting = anchor, anew
+                self.anchor, sighting = anchor, anew
         if sighting.confidence < _LEAST:
             self._speed = Similarity()
             return None

@@ -4,16 +4,15 @@ files. What a file is made of is in its name: a drawing that changes leaves thos
 
 from __future__ import annotations
 
-import errno
 import math
+import os
 import tempfile
 import time
-from collections.abc import Collection, Hashable, Iterator
-from contextlib import closing, contextmanager
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from collections.abc import Collection, Iterator
+from contextlib import closing, contextmanager, suppress
+from dataclasses import replace
+from functools import cache, cached_property
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 from OpenImageIO import ImageSpec
@@ -21,10 +20,10 @@ from OpenImageIO import ImageSpec
 from ..core import stopping
 from ..core.farm.claims import Claims
 from ..core.frames.frame_source import FrameSource, SourceWrapper
+from ..core.messages import MediaError
 from ..core.model import outlines, scribbles
-from . import carrying, derived, flow, opencv
+from . import carrying, derived, flow
 from .cuts import ShotSource
-from .errors import MediaError
 from .image_writing import write_levels
 from .outlining import traced
 
@@ -38,33 +37,6 @@ BLOCK = 20  # frames beyond a drawing that are carried together
 # life to the next: somebody waits for what is carried, and to carry it twice does no harm.
 _PAUSE, _PATIENCE, _BEAT = 0.5, 20.0, 4.0
 
-# Where mattes are kept until this program ends, in place of folders that cannot be written to; None: of no folder.
-_elsewhere: dict[Path | None, tempfile.TemporaryDirectory] = {}
-
-
-class Footage(Hashable, Protocol):
-    """What opens the source; equal where it gives the same frames."""
-
-    def open(self) -> FrameSource: ...
-
-
-@dataclass(frozen=True)
-class CarriedFile:
-    """A core.model.mattes.MatteFile of an outline.
-
-    drawings: by ascending source frame, the curves of each (core.model.outlines)
-    folder: where mattes are kept; for as long as this program runs where that cannot be written to, or is None"""
-
-    footage: Footage
-    # asked for the hash for every frame of a window, of what may be thousands of points
-    drawings: tuple[tuple[int, outlines.Curves], ...] = field(hash=False)
-    folder: Path | None = None
-
-    def open(self) -> CarriedMattes:
-        """MediaError: the footage cannot be read, or OpenCV is missing."""
-        opencv.check("outlines are tracked by", "ximgproc")
-        return CarriedMattes(self.footage.open(), self.drawings, self.folder)
-
 
 class CarriedMattes(SourceWrapper):
     """The mattes, a core.model.mattes.MatteSource; close it. Its frames are the source's filmed ones."""
@@ -74,6 +46,7 @@ class CarriedMattes(SourceWrapper):
     def __init__(
         self, source: FrameSource, drawings: tuple[tuple[int, outlines.Curves], ...], folder: Path | None = None
     ) -> None:
+        """Read mattes that are carried from drawings; see subject_mattes.CarriedFile."""
         super().__init__(source)
         self._shots = source if isinstance(source, ShotSource) else ShotSource(source)
         self._drawings = {frame: curves for frame, curves in drawings if 0 <= frame < self.count}
@@ -121,9 +94,7 @@ class CarriedMattes(SourceWrapper):
         straight from drawing to drawing. MediaError: the matte cannot be read."""
         if index in self._drawings:
             return self._drawings[index]
-        if self._near(index) != (None, None) and self.has(index):
-            return traced(self.read(index))
-        return outlines.curves(self._straight(index))
+        return traced(self.read(index)) if self.has(index) else outlines.curves(self._straight(index))
 
     def straight(self, index: int) -> np.ndarray:
         """What stands in for a frame's matte until that is carried, as `read`."""
@@ -131,8 +102,8 @@ class CarriedMattes(SourceWrapper):
 
     def _straight(self, index: int) -> list[np.ndarray]:
         """Strokes that go straight from drawing to drawing."""
-        first, last = self._near(index)
-        ends = [frame for frame in (first, last) if frame is not None]
+        near = nearest(index, self._drawings, carrying.FARTHEST)
+        ends = [frame for frame in near if frame is not None]
         if not ends:
             return []
         share = (index - ends[0]) / (ends[-1] - ends[0]) if ends[0] != ends[-1] else 0.0
@@ -151,23 +122,17 @@ class CarriedMattes(SourceWrapper):
     @contextmanager
     def _claimed(self, index: int, first: int | None, last: int | None) -> Iterator[np.ndarray | None]:
         """While this process alone carries what lies between two drawings; what another has kept of a matte by then."""
-        name = derived.key({"drawn": self._drawn(first, last)})
-        while True:
-            path = self._path(index, first, last)
-            with Claims(path.parent, _PATIENCE, _BEAT) as claims:
-                try:
-                    derived.own_folder(path.parent)
-                    while not claims.take(name) and not derived.is_kept(path):
-                        stopping.check()
-                        time.sleep(_PAUSE)
-                except OSError as error:
-                    if error.errno == errno.ELOOP or self._parent in _elsewhere:
-                        reason = error.strerror or error
-                        raise MediaError(f"{path.parent}: mattes cannot be written there ({reason})") from None
-                    _use_elsewhere(self._parent)
-                    continue
-                yield self._kept(path)
-                return
+        name, path = derived.key({"drawn": self._drawn(first, last)}), self._path(index, first, last)
+        with Claims(path.parent, _PATIENCE, _BEAT) as claims:
+            try:
+                derived.own_folder(path.parent)
+                while not claims.take(name) and not derived.is_kept(path):
+                    stopping.check()
+                    time.sleep(_PAUSE)
+            except OSError as error:
+                reason = error.strerror or error
+                raise MediaError(f"{path.parent}: mattes cannot be written there ({reason})") from None
+            yield self._kept(path)
 
     def close(self) -> None:
         """Closes the footage; a later read opens it again."""
@@ -233,11 +198,10 @@ class CarriedMattes(SourceWrapper):
     def _path(self, index: int, first: int | None, last: int | None) -> Path:
         """The file of a frame's matte, made of these drawings."""
         key = derived.key({"version": VERSION, "frame": index, "drawn": self._drawn(first, last)})
-        file = Path(self._folder, f"{index:08d}-{key}.png")
-        kept = Path(self._parent or "", file)
-        if self._parent and (self._parent not in _elsewhere or derived.is_kept(kept)):
+        name = f"{index:08d}-{key}.png"
+        if self._parent and derived.is_kept(kept := self._parent / self._folder / name):
             return kept
-        return Path(_use_elsewhere(self._parent), file)
+        return _writable(self._parent, self._folder) / name
 
     def _drawn(self, first: int | None, last: int | None) -> list[str]:
         return [self._keys[frame] for frame in (first, last) if frame is not None]
@@ -253,14 +217,26 @@ class CarriedMattes(SourceWrapper):
         return None if samples is None else samples[..., 0]
 
 
-def _use_elsewhere(parent: Path | None) -> str:
-    """Where mattes are kept in place of a folder. MediaError: nowhere."""
-    if parent not in _elsewhere:
-        try:
-            _elsewhere[parent] = tempfile.TemporaryDirectory(prefix=FOLDER, ignore_cleanup_errors=True)
-        except OSError as error:
-            raise MediaError(f"mattes cannot be written anywhere ({error.strerror or error})") from None
-    return _elsewhere[parent].name
+@cache
+def _writable(parent: Path | None, name: str) -> Path:
+    """Return a folder for mattes: in the parent or, if that is None or cannot be written to, in a temporary one."""
+    if parent is not None:
+        folder = parent / name
+        there = next(filter(os.path.lexists, (folder, *folder.parents)), folder)
+        with suppress(OSError):
+            if not (folder.is_symlink() and folder.is_dir()):  # derived.own_folder refuses a link
+                tempfile.TemporaryFile(dir=there).close()
+            return folder
+    return Path(_temporary().name, name)
+
+
+@cache
+def _temporary() -> tempfile.TemporaryDirectory:
+    """Return a folder that is there until this program ends. MediaError: it cannot be made."""
+    try:
+        return tempfile.TemporaryDirectory(prefix=FOLDER, ignore_cleanup_errors=True)
+    except OSError as error:
+        raise MediaError(f"mattes cannot be written anywhere ({error.strerror or error})") from None
 
 
 def nearest(index: int, frames: Collection[int], reach: float = math.inf) -> tuple[int | None, int | None]:

@@ -113,7 +113,7 @@ def carried(frames: Frames, first: Drawing | None, last: Drawing | None, span: r
             still = stillness(footage.moved[frame], footage.colors[frame], footage.colors[frame - 1])
             matte += cv2.resize(still, matte.shape[::-1]) * (before - matte)
         before = matte
-        yield Carried(frame, levels(matte), _confidence(share, sides))
+        yield Carried(frame, flow.levels(matte), _confidence(share, sides))
 
 
 def drawn(picture: np.ndarray, cover: np.ndarray) -> np.ndarray:
@@ -121,11 +121,7 @@ def drawn(picture: np.ndarray, cover: np.ndarray) -> np.ndarray:
 
     picture: (H, W, 3) uint8; cover: see Drawing"""
     shown = lab(flow.resized(picture, cover.shape[::-1]))
-    return levels(refined(picture, _mixed([_votes(shown, shown, cover, box_around(cover))], [1.0])))
-
-
-def levels(matte: np.ndarray) -> np.ndarray:
-    return np.rint(255 * matte).astype(np.uint8)
+    return flow.levels(refined(picture, _mixed([_votes(shown, shown, cover, box_around(cover))], [1.0])))
 
 
 @dataclass(frozen=True)

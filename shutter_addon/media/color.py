@@ -13,7 +13,7 @@ from OpenImageIO import FLOAT, ColorConfig, ImageBuf, ImageBufAlgo
 
 from ..core.frames import light
 from ..core.frames.frame_source import FrameSource, SourceWrapper
-from .errors import MediaError
+from ..core.messages import MediaError
 
 SCENE_LINEAR = "Linear Rec.709"  # in Blender's configuration
 # OpenImageIO caches files of transforms, but would read a configuration for every picture, which takes milliseconds.

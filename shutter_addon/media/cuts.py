@@ -12,7 +12,7 @@ from ..core.frames import light
 from ..core.frames.frame_source import FrameSource, SourceWrapper
 from ..core.frames.planes import Decoded, Moment, Planes, as_rgba
 from ..core.memo import Kept
-from .errors import MediaError
+from ..core.messages import MediaError
 
 # Frames on each side that decide about a cut. A film animated on threes has as many pictures there as PySceneDetect
 # compares.
@@ -106,7 +106,7 @@ def is_cut(before: list[Signature], after: list[Signature]) -> bool:
 
 def may_be_cut(before: Signature, after: Signature) -> bool:
     """Return whether these two neighbors allow a cut between them."""
-    return _differ(before, after, NOISE) and _unlike(before, after, BITS) >= APART
+    return _differ(before, after, NOISE) and _unlike(before, after) >= APART
 
 
 def _all_changes(before: Signature, after: Signature) -> bool:
@@ -114,7 +114,7 @@ def _all_changes(before: Signature, after: Signature) -> bool:
     any jump of the camera."""
     jumps = product(*(range(-(length // REACH), length // REACH + 1) for length in before.shape[:2]))
     return all(_differ(*parts, 0.0, PART) for parts in zip(_parts(before), _parts(after), strict=True)) and all(
-        _unlike(_shared(before, y, x), _shared(after, -y, -x), BITS) >= MOVED for y, x in jumps
+        _unlike(_shared(before, y, x), _shared(after, -y, -x)) >= MOVED for y, x in jumps
     )
 
 
@@ -164,20 +164,19 @@ def _change(before: np.ndarray, after: np.ndarray) -> float:
     return float(np.abs(_whole(before).max(axis=-1).astype(int) - _whole(after).max(axis=-1)).mean())
 
 
-def _unlike(before: np.ndarray, after: np.ndarray, bits: int) -> float:
-    """Return the share of HashDetector's bits × bits bits that differs."""
-    return np.count_nonzero(_hash(before, bits) != _hash(after, bits)) / bits**2
+def _unlike(before: np.ndarray, after: np.ndarray) -> float:
+    """Return the share of HashDetector's BITS × BITS bits that differs."""
+    return np.count_nonzero(_hash(before) != _hash(after)) / BITS**2
 
 
 def _whole(picture: np.ndarray) -> np.ndarray:
     return np.rint(picture).clip(0, 255).astype(np.uint8)
 
 
-def _hash(picture: np.ndarray, bits: int) -> np.ndarray:
+def _hash(picture: np.ndarray) -> np.ndarray:
     """Return which of the lowest frequencies are above their median."""
-    size = 2 * bits
-    small = _resized((_whole(picture) @ _GREY + (1 << 14)) >> 15, size)
-    waves = _waves(size)[:bits]
+    small = _resized((_whole(picture) @ _GREY + (1 << 14)) >> 15, 2 * BITS)
+    waves = _waves(2 * BITS)[:BITS]
     low = np.float32(waves @ np.float32(small / max(small.max(), 1)) @ waves.T)
     return np.greater(low, np.median(low))
 
@@ -301,27 +300,24 @@ class ShotSource(SourceWrapper):
 
     def _decide(self, index: int) -> tuple[bool, bool]:
         """Return whether there is a cut before a filmed frame, and whether all frames that decide it could be read."""
-        last, next_ = self._readable(index - 1), self._readable(index)
+        last, next_ = self._signature(index - 1), self._signature(index)
         if last is None or next_ is None:
             return False, False
         if not may_be_cut(last, next_):
             return False, True
         start, stop = max(index - NEIGHBOURS, 0), min(index + NEIGHBOURS, self.filmed)
-        beside = [self._readable(i) for i in range(start, stop)]
+        beside = [self._signature(i) for i in range(start, stop)]
         before, after = _known(reversed(beside[: index - start]))[::-1], _known(beside[index - start :])
         return is_cut(before, after), len(before) + len(after) == len(beside)
 
-    def _readable(self, index: int) -> Signature | None:
+    def _signature(self, index: int) -> Signature | None:
         """Return a signature, or None if the frame cannot be read. Reading the frame itself raises the error."""
-        try:
-            return self._signature(index)
-        except MediaError:
-            return None
-
-    def _signature(self, index: int) -> Signature:
         if index in self._signatures:
             return self._signatures[index]
-        frame = self.decoded(index * self.step)
+        try:
+            frame = self.decoded(index * self.step)
+        except MediaError:
+            return None
         shown = frame.ends[0] if isinstance(frame, Moment) else frame  # a repeated frame may be a moment of equal ends
         made = self._signatures.keep(index, signature(shown, self.transfer, self.alpha), _KEPT)
         self._handed[index * self.step] = frame

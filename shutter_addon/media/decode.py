@@ -18,8 +18,8 @@ from av.video.frame import PictureType
 from av.video.reformatter import ColorRange
 from av.video.stream import VideoStream
 
-from .errors import MediaError
-from .files import FOREIGN, OTHER, is_other
+from ..core.messages import MediaError
+from .files import FOREIGN
 
 if TYPE_CHECKING:
     from av.rational import AVRational
@@ -140,8 +140,6 @@ class FrameReader:
     def _restart(self) -> _Run:
         """Open the file again and decode from the start. With an edit list or without an index, a seek would fail."""
         self.close()
-        if is_other(self._path):  # the file may have been replaced
-            raise MediaError(OTHER)
         self._container = av.open(str(self._path))
         stream = _video_stream(self._container, self._path.name, self._number)
         self.time_base, self.start = fraction(stream.time_base), stream.start_time or 0

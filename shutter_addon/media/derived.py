@@ -20,8 +20,8 @@ from OpenImageIO import ImageInput, ImageSpec, geterror
 from ..core import atomic_write
 from ..core.frames.frame_source import FrameSource
 from ..core.frames.planes import STEP
+from ..core.messages import MediaError
 from . import flow
-from .errors import MediaError
 from .files import check_name
 from .image_writing import write_exr
 
@@ -30,7 +30,6 @@ WHOLE = 8 << 20  # bytes; files of a source up to this size, such as uncompresse
 BLOCKS, BLOCK = 16, 4096  # of a larger file so many blocks, of so many bytes each, are hashed
 _LARGER = 1 << 20  # bytes; a file that is larger than its samples by more holds something else
 
-_JUNCTION = 0xA0000003  # st_reparse_tag of a folder on Windows that leads to another
 _CHANNELS = tuple(f"value{k}" for k in range(6))  # of a file of vectors
 
 _SHAPE = "roi", "roi_full", "channelnames", "format", "channelformats", "deep"
@@ -44,14 +43,11 @@ def identity(source: FrameSource) -> dict:
     content = hashlib.sha256()
     for path in source.files:
         content.update(content_digest(path))
-    return {
+    known = {name: getattr(source, name) for name in ("count", "transfer", "alpha", "options")}
+    return known | {
         "content": content.hexdigest(),
-        "count": source.count,
         "size": [source.width, source.height],
         "dtype": source.dtype.name,
-        "transfer": source.transfer,
-        "alpha": source.alpha,
-        "options": source.options,
     }
 
 
@@ -68,13 +64,13 @@ def content_digest(path: Path, whole: int = WHOLE) -> bytes:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):  # a pipe would never end
             raise MediaError(f"{path.name}: is no file")
-        return content_hash(path, status.st_size, status.st_mtime_ns, whole)
+        return _hash(path, status.st_size, status.st_mtime_ns, whole)
     except OSError as error:
         raise MediaError(f"{path.name}: cannot be read ({error.strerror})") from None
 
 
 @lru_cache(maxsize=1 << 17)  # a sequence of an hour and a half
-def content_hash(path: Path, size: int, _mtime: int, whole: int) -> bytes:
+def _hash(path: Path, size: int, _mtime: int, whole: int) -> bytes:
     """The SHA-256 of a file's content; of a file over `whole`, that of its size and of blocks spread over it."""
     with path.open("rb") as file:
         if size <= whole:
@@ -140,9 +136,8 @@ def own_folder(path: Path) -> None:
 
 
 def refuse_link(path: Path) -> None:
-    """Raise OSError for a link, and where there is nothing."""
-    status = path.lstat()
-    if stat.S_ISLNK(status.st_mode) or getattr(status, "st_reparse_tag", 0) == _JUNCTION:
+    """Raise OSError for a link."""
+    if path.is_symlink() or path.is_junction():
         raise OSError(errno.ELOOP, "it is a link, and none is followed")
 
 

@@ -5,10 +5,9 @@ from functools import cache
 from pathlib import Path
 
 from ..core.frames.frame_source import FrameSource
-from .errors import MediaError
+from ..core.messages import MediaError
 
 PIXELS = 1 << 28  # 16384×16384, FFmpeg's limit; a damaged header may claim any size
-OTHER = "is no file, but a pipe, a socket or a device"
 FOREIGN = "an image of a kind that Blender does not read; save it as PNG, TIFF or EXR first"
 
 
@@ -32,12 +31,10 @@ def check_file(path: str | Path) -> Path:
         raise MediaError(f"{path.name}: is a folder, not a file")
     if not path.exists():
         raise MediaError(f"{path.name}: no such file in {path.absolute().parent}")
-    if is_other(path):
-        raise MediaError(f"{path.name}: {OTHER}")
+    if not path.is_file():  # opening a pipe may never return
+        raise MediaError(f"{path.name}: is no file, but a pipe, a socket or a device")
     if path.stat().st_size == 0:
         raise MediaError(f"{path.name}: file is empty")
-    if not os.access(path, os.R_OK):
-        raise MediaError(f"{path.name}: may not be read")
     return path
 
 
@@ -64,11 +61,6 @@ def check_sound(path: str | Path) -> None:
         has_sound = False
     if not has_sound:
         raise MediaError(f"{path.name}: has no sound, or cannot be read")
-
-
-def is_other(path: Path) -> bool:
-    """Return whether a path is neither a file nor a folder. Opening a pipe may never return."""
-    return path.exists() and not (path.is_file() or path.is_dir())
 
 
 def check_name(path: str | Path) -> str:

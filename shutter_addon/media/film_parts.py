@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..core import atomic_write
-from .errors import MediaError
+from ..core.messages import MediaError
 from .files import check_name
 from .rendered_pictures import is_whole_movie
 

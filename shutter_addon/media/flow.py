@@ -19,7 +19,6 @@ from ..core.frames import light
 from ..core.frames.frame_source import FrameSource
 from ..core.frames.planes import STEP, TILE, UNIT, ZERO, Moment
 from ..core.memo import Kept
-from . import opencv
 from .opencv import cv2
 
 SMALLEST = 16  # pixels; OpenCV's flows need about as many, smaller pictures are cross-faded
@@ -33,11 +32,6 @@ SHARED = 0.5  # of all vectors, in both directions, have to
 STILL, MOVES = UNIT // 8, 2 * UNIT
 _KEPT = 4  # key moments, and sets of vectors
 VERSION = 1  # raise it when `found` gives something else of the same pictures
-
-
-def check() -> None:
-    """MediaError: OpenCV is missing."""
-    opencv.check("moments between frames need")
 
 
 class Between:

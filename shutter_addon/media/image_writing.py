@@ -7,7 +7,7 @@ import numpy as np
 import OpenImageIO
 
 from ..core import atomic_write
-from .errors import MediaError
+from ..core.messages import MediaError
 from .files import check_name
 from .rendered_pictures import UNKNOWN, why_short
 
@@ -25,35 +25,28 @@ def write_exr(path: Path, values: np.ndarray, names: Sequence[str], note: str = 
         MediaError: it cannot be written
     """
     samples = values if values.dtype == np.float16 else np.asarray(values, np.float32)
-    spec = _spec(samples)
-    spec.channelnames = tuple(names)
-    spec["compression"] = "zip"
-    spec["DateTime"] = "1970:01:01 00:00:00"  # not the time of writing, so that equal samples make equal files
-    if note:
-        spec["Note"] = note
-    _write(path, spec, samples)
+    # The date is not the time of writing, so that equal samples make equal files.
+    told = {"compression": "zip", "DateTime": "1970:01:01 00:00:00", "Note": note}
+    _write(path, samples, {name: text for name, text in told.items() if text}, names)
 
 
 def write_grey(path: Path, values: np.ndarray) -> None:
     """Write values (height, width) float32, 0 … 1, as a 16-bit PNG; raise MediaError if that fails."""
-    samples = np.rint(values[..., None] * np.float32(65535)).astype(np.uint16)
-    _write(path, _spec(samples), samples)
+    _write(path, np.rint(values[..., None] * np.float32(65535)).astype(np.uint16), {})
 
 
 def write_levels(path: Path, levels: np.ndarray, description: str) -> None:
     """Write levels (height, width) uint8 as an 8-bit PNG with a description; raise MediaError if that fails."""
-    spec = _spec(levels[..., None])
-    spec["ImageDescription"] = description
-    _write(path, spec, levels[..., None])
+    _write(path, levels[..., None], {"ImageDescription": description})
 
 
-def _spec(samples: np.ndarray) -> OpenImageIO.ImageSpec:
+def _write(path: Path, samples: np.ndarray, attributes: dict[str, str], names: Sequence[str] = ()) -> None:
     height, width, channels = samples.shape
     kind = {"float16": "half", "float32": "float"}.get(samples.dtype.name, samples.dtype.name)
-    return OpenImageIO.ImageSpec(width, height, channels, kind)
-
-
-def _write(path: Path, spec: OpenImageIO.ImageSpec, samples: np.ndarray) -> None:
+    spec = OpenImageIO.ImageSpec(width, height, channels, kind)
+    spec.channelnames = tuple(names) or spec.channelnames
+    for name, text in attributes.items():
+        spec[name] = text
     try:
         with atomic_write.writing(path) as part:
             name = check_name(part)

@@ -13,12 +13,12 @@ from ..core.model import outlines
 from ..core.model.effect import Subject
 from ..core.model.motions import Motion, Similarity
 from . import flow, registration, tracking
-from .carried_mattes import CarriedFile, CarriedMattes
+from .carried_mattes import CarriedMattes
 from .carrying import box_around
 from .footage import Footage
 from .opencv import cv2
 from .pursuit import COVERED, LEFT, Sighting
-from .subject_mattes import SubjectFile
+from .subject_mattes import CarriedFile
 from .tracking import Tracked, TrackingError
 
 EMPTY = "the outline encloses nothing here"
@@ -48,7 +48,7 @@ def cover_within(drawn: Callable[[int], Sequence]) -> Cover:
 
 
 def follow_carried(
-    region: Subject, file: CarriedFile | SubjectFile, shown: Mapping[float, int], *what: Any, **how: Any
+    region: Subject, file: CarriedFile, shown: Mapping[float, int], *what: Any, **how: Any
 ) -> Iterator[Tracked]:
     """Yield MatteTrack.follow for a carried outline.
 
@@ -77,11 +77,9 @@ class MatteTrack(tracking.Track):
     def _cover(self, frame: int) -> np.ndarray:
         return self._covers(frame, self._footage.size)
 
-    def _check(self, frame: int) -> None:
-        if not (self._cover(frame) > _INSIDE).any():
-            raise TrackingError(EMPTY)
-
     def _pursuit(self, start: int) -> tuple[_Pursuit, float]:
+        if not (self._cover(start) > _INSIDE).any():
+            raise TrackingError(EMPTY)
         return _Pursuit(self._cover, self._footage, start, self._motion), 1.0
 
 

@@ -21,8 +21,8 @@ from numpy.typing import DTypeLike
 
 from ..core.frames.frame_source import FrameSource
 from ..core.frames.planes import Decoded, Matrix, Planes, as_rgba, matrix
+from ..core.messages import MediaError
 from .decode import FrameReader, fraction, reason
-from .errors import MediaError
 from .files import check_file, check_index
 from .reduced import reduced, reduced_size
 
@@ -95,10 +95,6 @@ class MovieSource(FrameSource):
     def read(self, index: int) -> np.ndarray:
         return as_rgba(self.decoded(index))
 
-    def _picture(self, index: int, frame: av.VideoFrame) -> np.ndarray:
-        with self._named(index):
-            return self._pixels(frame)
-
     def decoded(self, index: int) -> Decoded:
         """Return the frame, or its planes in the decoder's memory if they are 8-bit 4:2:0 in BT.601 or 709.
 
@@ -109,8 +105,7 @@ class MovieSource(FrameSource):
             if (to_rgb := self._matrix(frame)) is None:
                 return self._pixels(frame)
             luma, cb, cr = map(_samples_of, frame.planes)
-            rgba = partial(self._picture, index, frame)
-            return Planes(luma=luma, chroma=(cb, cr), matrix=to_rgb, rgba=rgba)
+            return Planes(luma=luma, chroma=(cb, cr), matrix=to_rgb, rgba=partial(self._pixels, frame))
 
     def grey(self, index: int) -> np.ndarray | None:
         """Return the frame's luma (height, width, 1) if it is the luminance of its colors, else None."""

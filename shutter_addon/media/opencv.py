@@ -1,6 +1,6 @@
 """OpenCV, which is missing in a package without wheels."""
 
-from .errors import MediaError
+from ..core.messages import MediaError
 
 try:
     import cv2

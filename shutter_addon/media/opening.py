@@ -3,20 +3,21 @@ a movie, of an image sequence or of a picture, as values 0 … 1."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..core.frames.frame_source import FrameSource, SourceWrapper
 from ..core.frames.light import REC709
+from ..core.messages import MediaError
 from .blender_movie import BlenderMovie, is_lent
 from .color import in_colorspace
-from .errors import MediaError
 from .files import check_file, pyav_missing
 from .reduced import ProxySource, fits, smaller
-from .sequence import CHANNELS, IMAGE_SUFFIXES, SequenceChannel, SequenceSource, no_channel
+from .sequence import CHANNELS, IMAGE_SUFFIXES, SequenceSource, no_channel
 
 
 def open_source(
@@ -58,43 +59,22 @@ def open_source(
         raise
 
 
-def with_proxy(source: FrameSource, opened: Callable[[], FrameSource]) -> FrameSource:
-    """Return a source that reads the frames from a proxy, or the source itself if no proxy fits.
+def with_proxy(source: FrameSource, path: Path, **how: Any) -> FrameSource:
+    """Return a source that reads the frames from a proxy, or the source itself if the proxy does not fit.
 
     Args:
         source: the footage
-        opened: returns the proxy, or raises MediaError
+        path: the proxy's
+        how: arguments of open_source
     """
     try:
-        proxy = opened()
+        proxy = open_source(path, **how)
     except MediaError:
         return source
     if fits(proxy, source):
         return ProxySource(source, proxy)
     proxy.close()
     return source
-
-
-def open_channel(
-    path: str | Path, channel: str, *, files: Sequence[str | Path] | None = None, stream: int = 0
-) -> FrameSource:
-    """Open one channel of a movie or of an image sequence.
-
-    Args:
-        path: the file
-        channel: one of sequence.CHANNELS, or the name of a channel in the images
-        files: as for open_source
-        stream: as for open_source
-
-    Raises:
-        MediaError: it cannot be read, or has no such channel
-    """
-    path = Path(path)
-    if not _is_movie(path, files):
-        return SequenceChannel(path, channel, files=files)
-    if channel not in CHANNELS:
-        raise no_channel(check_file(path), channel, CHANNELS)
-    return movie_channel(_opened_movie(path, stream), channel)
 
 
 def _is_movie(path: Path, files: Sequence[str | Path] | None) -> bool:
@@ -159,8 +139,14 @@ class MatteFile:
         Raises:
             MediaError: it cannot be read, or has no such channel
         """
-        channel = open_channel(self.path, self.channel, files=self.files, stream=self.stream)
-        return SourceWrapper(channel, lambda index: _values(channel.read(min(max(index, 0), channel.count - 1))))
+        source: FrameSource
+        if not _is_movie(self.path, self.files):
+            source = SequenceSource(self.path, channel=self.channel, files=self.files)
+        elif self.channel in CHANNELS:
+            source = movie_channel(_opened_movie(self.path, self.stream), self.channel)
+        else:
+            raise no_channel(check_file(self.path), self.channel, CHANNELS)
+        return SourceWrapper(source, lambda index: _values(source.read(min(max(index, 0), source.count - 1))))
 
 
 def _values(samples: np.ndarray) -> np.ndarray:

@@ -8,7 +8,6 @@ import numpy as np
 
 from ..core.model.outlines import Curves, curves
 from . import opencv
-from .carrying import working_size
 from .opencv import cv2
 
 ROUNDS = 6
@@ -20,16 +19,10 @@ FINE = 4  # contours are followed in mattes so many times as large
 SPOT = 6.0  # pixels: what covers no more of them is no part of a subject
 
 
-def working_shape(picture: np.ndarray) -> tuple[int, int]:
-    """Height and width in which strokes are given, and colours compared."""
-    width, height = working_size(*picture.shape[1::-1])
-    return height, width
-
-
 def proposed(picture: np.ndarray, drawn: np.ndarray, *, encloses: bool) -> Curves:
     """Curves (core.model.outlines) around the subject of a picture (H, W, 3) uint8; none where it has none.
 
-    drawn: (h, w) bool, working_shape's: what strokes cover, or what they enclose
+    drawn: (h, w) bool, of carrying.working_size: what strokes cover, or what they enclose
     MediaError: OpenCV is missing."""
     opencv.check("outlines are proposed by")
     if not drawn.any():
@@ -90,13 +83,12 @@ def traced(matte: np.ndarray, off: float = 0.5) -> Curves:
     height, width = part.shape
     fine = cv2.resize(part, (width * FINE, height * FINE), interpolation=cv2.INTER_LINEAR)
     contours, _ = cv2.findContours((fine > 0.5).astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
-    found = [cv2.approxPolyDP(contour, off * FINE, True)[:, 0] for contour in contours if _area(contour) > SPOT]
+    found = [
+        cv2.approxPolyDP(contour, off * FINE, True)[:, 0]
+        for contour in contours
+        if cv2.contourArea(contour) > SPOT * FINE**2
+    ]
     found = sorted((each for each in found if len(each) > 2), key=cv2.contourArea, reverse=True)
     size = np.array(matte.shape[::-1])
     placed = [(points + 0.5) / FINE + (left - 1, top - 1) for points in found]
     return curves([np.clip(points / size, 0, 1) * (1, -1) + (0, 1) for points in placed])
-
-
-def _area(contour: np.ndarray) -> float:
-    """In pixels of the matte."""
-    return cv2.contourArea(contour) / FINE**2

@@ -9,7 +9,7 @@ import numpy as np
 from ..core import stopping, threads
 from ..core.frames.frame_source import FrameSource, SourceWrapper
 from ..core.frames.planes import Decoded, as_rgba
-from .errors import MediaError
+from ..core.messages import MediaError
 
 _PATIENCE = 0.1  # seconds between two looks at whether a frame is still wanted
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from ..core import stopping
 from ..core.frames.frame_source import FrameSource
+from ..core.messages import MediaError
 from . import flow, opencv
-from .errors import MediaError
 from .opencv import cv2
 
 ROWS = 540  # the most rows of the pictures
@@ -57,11 +57,7 @@ def of_source(source: FrameSource, indices: Sequence[int], *, columns: bool = Fa
     """
     opencv.check("the readout is found by")
     source.want(indices)
-    pictures = []
-    for index in indices:
-        stopping.check()
-        pictures.append(flow.of_rows(source.read(index), source, ROWS, turned=columns))
-    return of_pictures(pictures)
+    return of_pictures([flow.of_rows(source.read(index), source, ROWS, turned=columns) for index in indices])
 
 
 def of_pictures(pictures: Sequence[np.ndarray]) -> float:

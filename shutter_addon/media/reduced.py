@@ -6,8 +6,8 @@ import numpy as np
 
 from ..core.frames.frame_source import FrameSource, SourceWrapper
 from ..core.frames.light import to_linear
+from ..core.messages import MediaError
 from ..core.pixels.matte_grid import block_sums
-from .errors import MediaError
 from .opencv import cv2
 
 DIVISORS = 1, 2, 4

@@ -13,7 +13,6 @@ from ..core.farm import job_file
 from .files import check_name, pyav_missing
 
 UNKNOWN = "the cause is unknown"  # why a file is cut off
-_PNG_END = b"IEND\xaeB`\x82"
 _BLEND_END = 32  # bytes of the last block
 _ZSTD_TABLE_END = b"\xb1\xea\x92\x8f"
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
@@ -49,20 +48,16 @@ def read(path: Path, edit: str | None = None) -> RenderedPicture | None:
     if image is None:
         geterror()
         return None
-    try:
+    with closing(image), suppress(OSError, UnicodeDecodeError):  # UnicodeDecodeError: of names in a damaged file
         spec = image.spec()
         key = job_file.key_in(spec.get_string_attribute("Note"))
         if edit not in (None, key):
             return None
         is_png = path.suffix.lower() == ".png"
-        if not (_is_sound_png(path) if is_png else image.read_image(spec.format) is not None):
-            return None
-        size = spec.width, spec.height
-        return RenderedPicture(size=size, channels=spec.nchannels, samples=str(spec.format), edit=key)
-    except (OSError, UnicodeDecodeError):  # UnicodeDecodeError: of names in a damaged file
-        return None
-    finally:
-        image.close()
+        if _is_sound_png(path) if is_png else image.read_image(spec.format) is not None:
+            size = spec.width, spec.height
+            return RenderedPicture(size=size, channels=spec.nchannels, samples=str(spec.format), edit=key)
+    return None
 
 
 def is_transparent(path: Path) -> bool:
@@ -93,11 +88,9 @@ def _is_sound_png(path: Path) -> bool:
 
 
 def is_whole_picture(path: Path) -> bool:
-    """Return whether a PNG or EXR file is complete, judged by its end."""
+    """Return whether a PNG or EXR file is complete: a PNG by its checksums, an EXR by its last row."""
     if path.suffix.lower() == ".png":
-        with path.open("rb") as file:
-            file.seek(max(0, path.stat().st_size - len(_PNG_END)))
-            return file.read() == _PNG_END
+        return _is_sound_png(path)
     image = ImageInput.open(check_name(path))
     if image is None:
         return False

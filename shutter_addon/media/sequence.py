@@ -3,7 +3,7 @@
 import itertools
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from functools import lru_cache, partial
 from pathlib import Path
 
@@ -11,7 +11,7 @@ import numpy as np
 from OpenImageIO import ImageInput, ImageSpec, geterror
 
 from ..core.frames.frame_source import FrameSource
-from .errors import MediaError
+from ..core.messages import MediaError
 from .files import FOREIGN, check_file, check_index, check_name, check_size, stamp
 
 # The channels that every picture has, whatever their names in the file.
@@ -22,7 +22,6 @@ CHANNELS = {
     "blue": slice(2, 3),
     "alpha": slice(3, 4),
 }
-_TOLD = 6  # channels that a message names
 # In Blender, these are scene linear, even logarithmic DPX. All other formats are sRGB, even float TIFF.
 LINEAR_SUFFIXES = frozenset({".exr", ".hdr", ".rgbe", ".dpx", ".cin"})
 OTHER_SUFFIXES = ".png .jpg .jpeg .jpe .tif .tiff .tga .bmp .webp .jp2 .j2k .j2c .psd .sgi .rgb .rgba .bw"
@@ -42,18 +41,44 @@ _Parts = tuple[str, str, str]  # a file's stem: before a number, its digits, aft
 Layer = tuple[ImageSpec, list[int]]  # the spec of a part of an image, and positions of channels in it
 
 
-class _Sequence(FrameSource):
-    """The files of an image sequence as frames.
+class SequenceSource(FrameSource):
+    """Images as frames, or one of their channels.
 
     With `files` (an image strip's list), frame i is files[i]. Else files are found beside the first one, and frame i is
     the file whose number is i higher. If a number is missing, the file before it is repeated. If more than MISSING are
     missing in a row, the sequence ends, and `left_out` tells so.
+
+    As in Blender, samples are not changed: straight alpha stays straight, EXIF orientation is ignored, and the picture
+    of an EXR is its data window. All frames must have the first one's size and sample type. The source has alpha if any
+    frame has.
+
+    The frames of a channel are its stored samples (height, width, n) of any type: n is 3 (RGB) for the luminance of
+    colors, 0 for the alpha of an opaque image, else 1. An EXR's picture is then its display window, 0 outside its data
+    window, because mattes are often cropped to what they cover. If the data window is larger on all sides, it is the
+    picture, as in Blender.
     """
 
     fps = None
 
-    def __init__(self, path: str | Path, files: Sequence[str | Path] | None) -> None:
-        """Find the files; raise MediaError if the first one is missing or its folder cannot be listed."""
+    def __init__(
+        self,
+        path: str | Path,
+        *,
+        files: Sequence[str | Path] | None = None,
+        alpha: str | None = None,
+        channel: str | None = None,
+    ) -> None:
+        """Find the files, and read the first one's header.
+
+        Args:
+            path: the first file
+            files: as above
+            alpha: as for opening.open_source
+            channel: one of CHANNELS, or a name in the files; None: all colors
+
+        Raises:
+            MediaError: the first file cannot be read or has no such channel, or its folder cannot be listed
+        """
         path = Path(path)
         if files is None:
             self.path = check_file(path)
@@ -71,50 +96,46 @@ class _Sequence(FrameSource):
                 raise MediaError(f"{path.name}: an image sequence without files")
             self.path = check_file(self.files[0])
         self.count = len(self.files)
-
-    def _file(self, index: int) -> Path:
-        """Return a frame's file; raise MediaError if it is missing, IndexError if there is no such frame."""
-        check_index(self, index)
-        return check_file(self.files[index])
-
-    def _check_size(self, path: Path, size: tuple[int, int], window: str = "") -> None:
-        """Raise MediaError if a file's size differs from the first one's."""
-        if size != (self.width, self.height):
-            first = f"{self.path.name} is {self.width}×{self.height}"
-            raise MediaError(f"{path.name}: is {size[0]}×{size[1]}{window}, but {first}")
-
-
-class SequenceSource(_Sequence):
-    """Images as frames (see _Sequence).
-
-    As in Blender, samples are not changed: straight alpha stays straight, EXIF orientation is ignored, and the picture
-    of an EXR is its data window. All frames must have the first one's size and sample type. The source has alpha if any
-    frame has.
-    """
-
-    def __init__(
-        self, path: str | Path, *, files: Sequence[str | Path] | None = None, alpha: str | None = None
-    ) -> None:
-        super().__init__(path, files)
-        with _opened(self.path) as (image, spec, layer):
+        self._channel = channel
+        self._layer_of = partial(_channel_named, channel) if channel else _first_colours
+        with _opened(self.path, self._layer_of) as (image, spec, layer):
             self.file_kind = f"{image.format_name()}, {spec.nchannels} channels of {spec.format}"
-            self.width, self.height = spec.width, spec.height
+            _, _, self.width, self.height = self._window(image, spec, self.path)
             self.dtype = _dtype(spec)
         self.transfer = "linear" if self.path.suffix.lower() in LINEAR_SUFFIXES else "srgb"
-        has_alpha = len(layer) in ALPHA or any(map(_has_alpha, dict.fromkeys(self.files)))
+        has_alpha = not channel and (len(layer) in ALPHA or any(map(_has_alpha, dict.fromkeys(self.files))))
         self.alpha = (alpha or self._usual_alpha()) if has_alpha else "opaque"
         self.options = {}
 
     def read(self, index: int) -> np.ndarray:
-        """Return the frame; raise MediaError if the file is missing, damaged or unlike the first."""
-        path = self._file(index)
-        with _opened(path) as (image, spec, layer):
-            size, dtype = (spec.width, spec.height), _dtype(spec)
-            whole = size == (spec.full_width, spec.full_height)
-            self._check_size(path, size, "" if whole else " (its data window)")
-            if dtype != self.dtype:
-                raise MediaError(f"{path.name}: has {dtype} samples, but {self.path.name} has {self.dtype}")
-            return expanded(_samples(image, spec, layer, path))
+        """Return the frame, or the channel's samples.
+
+        Raises:
+            MediaError: the file is missing, damaged or unlike the first
+            IndexError: there is no such frame
+        """
+        check_index(self, index)
+        path = check_file(self.files[index])
+        with _opened(path, self._layer_of) as (image, spec, layer):
+            window = self._window(image, spec, path)
+            size, dtype, first = window[2:], _dtype(spec), self.path.name
+            if size != (self.width, self.height):
+                is_cropped = size != (spec.full_width, spec.full_height)
+                told = f"{size[0]}×{size[1]}{' (its data window)' if is_cropped else ''}"
+                raise MediaError(f"{path.name}: is {told}, but {first} is {self.width}×{self.height}")
+            if not self._channel and dtype != self.dtype:
+                raise MediaError(f"{path.name}: has {dtype} samples, but {first} has {self.dtype}")
+            if not layer:
+                return np.empty((self.height, self.width, 0), np.uint8)
+            samples = _in_window(_samples(image, spec, layer, path), spec, window)
+            return samples if self._channel else expanded(samples)
+
+    def _window(self, image: ImageInput, spec: ImageSpec, path: Path) -> Window:
+        """Return the window of an image that is shown."""
+        if not self._channel or image.format_name() != "openexr" or spec.roi.contains(spec.roi_full):
+            return spec.x, spec.y, spec.width, spec.height
+        check_size(path.name, spec.full_width, spec.full_height)
+        return spec.full_x, spec.full_y, spec.full_width, spec.full_height
 
     def _usual_alpha(self) -> str:
         """Return what Blender assumes. It ignores what a TIFF tells."""
@@ -130,47 +151,6 @@ def expanded(samples: np.ndarray) -> np.ndarray:
     opaque = np.iinfo(samples.dtype).max if samples.dtype.kind == "u" else 1
     picture[..., 3] = samples[..., -1] if channels in ALPHA else opaque
     return picture
-
-
-class SequenceChannel(_Sequence):
-    """A channel of the images of a sequence (see _Sequence), with its stored samples of any type.
-
-    All frames must have the first one's size. An EXR's picture is its display window, 0 outside its data window,
-    because mattes are often cropped to what they cover. If the data window is larger on all sides, it is the picture,
-    as in Blender.
-    """
-
-    def __init__(self, path: str | Path, channel: str, *, files: Sequence[str | Path] | None = None) -> None:
-        """Open a channel: one of CHANNELS, or a name in the files. Raise MediaError if there is none."""
-        super().__init__(path, files)
-        self._layer_of = partial(_channel_named, channel)
-        with _opened(self.path, self._layer_of) as (image, spec, _positions):
-            _, _, self.width, self.height = _picture_window(image, spec, self.path)
-
-    def read(self, index: int) -> np.ndarray:
-        """Return the channel's samples (height, width, n), top row first.
-
-        n is 3 (RGB) for the luminance of colors, 0 for the alpha of an opaque image, else 1.
-
-        Raises:
-            MediaError: the file is missing, damaged or unlike the first
-            IndexError: there is no such frame
-        """
-        path = self._file(index)
-        with _opened(path, self._layer_of) as (image, spec, positions):
-            window = _picture_window(image, spec, path)
-            self._check_size(path, window[2:])
-            if not positions:
-                return np.empty((self.height, self.width, 0), np.uint8)
-            return _in_window(_samples(image, spec, positions, path), spec, window)
-
-
-def _picture_window(image: ImageInput, spec: ImageSpec, path: Path) -> Window:
-    """Return the window (x, y, width, height) of an image that a SequenceChannel shows."""
-    if image.format_name() != "openexr" or spec.roi.contains(spec.roi_full):
-        return spec.x, spec.y, spec.width, spec.height
-    check_size(path.name, spec.full_width, spec.full_height)
-    return spec.full_x, spec.full_y, spec.full_width, spec.full_height
 
 
 def _in_window(samples: np.ndarray, spec: ImageSpec, window: Window) -> np.ndarray:
@@ -230,7 +210,10 @@ def _frame_number(path: Path) -> tuple[_Parts | None, list[Path]]:
     numbers = _numbers(path.stem)
     if not numbers:
         return None, [path] if path.exists() else []
-    files, found = sorted(_listed(path.parent)), []
+    try:
+        files, found = sorted(path.parent.iterdir()), []
+    except OSError as error:
+        raise MediaError(f"{path.parent}: cannot be listed ({error.strerror})") from None
     for before, digits, behind in numbers:
         name = re.compile(re.escape(before) + r"\d+" + re.escape(behind + path.suffix))
         alike = [file for file in files if name.fullmatch(file.name)]
@@ -260,13 +243,6 @@ def by_number(path: Path, *, listed: bool = False) -> Callable[[int], Path] | No
         return None
     before, digits, behind = parts
     return lambda i: path.with_name(f"{before}{int(digits) + i:0{len(digits)}d}{behind}{path.suffix}")
-
-
-def _listed(folder: Path) -> list[Path]:
-    try:
-        return list(folder.iterdir())
-    except OSError as error:
-        raise MediaError(f"{folder}: cannot be listed ({error.strerror})") from None
 
 
 def _has_alpha(path: Path) -> bool:
@@ -305,7 +281,7 @@ def _first_colours(image: ImageInput, path: Path) -> Layer:
             if (spec.width, spec.height) != (whole.width, whole.height):
                 raise MediaError(f"{path.name}: its parts have different data windows")
             return spec, layer
-        names += [f"deep {name}" for name in spec.channelnames] if spec.deep else spec.channelnames
+        names += spec.channelnames
     raise MediaError(f"{path.name}: no colour channels, only {', '.join(names)}")
 
 
@@ -359,23 +335,22 @@ def _opened(
 ) -> Iterator[tuple[ImageInput, ImageSpec, list[int]]]:
     """Open an image with a layer of `layer_of`; raise MediaError if it cannot be read.
 
-    The layer's channels are Y, YA, RGB or RGBA, or those of a SequenceChannel.
+    The layer's channels are Y, YA, RGB or RGBA, or those of a channel.
     """
     wishes = ImageSpec()
     wishes.attribute("oiio:UnassociatedAlpha", 1)  # no premultiplication on reading
-    image = ImageInput.open(check_name(path), wishes)
-    if image is None:
-        raise MediaError(f"{path.name}: cannot be read as an image ({_told(geterror, path, 'unknown format')})")
     try:
-        if image.format_name() not in BLENDERS_FORMATS.split():
-            raise MediaError(f"{path.name}: {FOREIGN}")
-        spec, layer = layer_of(image, path)
-        check_size(path.name, spec.width, spec.height)
-        yield image, spec, layer
-    except UnicodeDecodeError as error:  # names in a damaged file
-        raise MediaError(f"{path.name}: cannot be read as an image ({_as_text(error)})") from None
-    finally:
-        image.close()
+        if (image := ImageInput.open(check_name(path), wishes)) is None:
+            raise MediaError(f"{path.name}: cannot be read as an image ({_told(geterror(), path, 'unknown format')})")
+        with closing(image):
+            if image.format_name() not in BLENDERS_FORMATS.split():
+                raise MediaError(f"{path.name}: {FOREIGN}")
+            spec, layer = layer_of(image, path)
+            check_size(path.name, spec.width, spec.height)
+            yield image, spec, layer
+    except UnicodeDecodeError as error:  # names or messages in a damaged file
+        text = error.object.decode(errors="replace")
+        raise MediaError(f"{path.name}: cannot be read as an image ({text})") from None
 
 
 def _dtype(spec: ImageSpec) -> np.dtype:
@@ -392,27 +367,16 @@ def _samples(image: ImageInput, spec: ImageSpec, layer: list[int], path: Path) -
         kind = "uint"  # whole numbers in an EXR are not scaled
     samples = image.read_image(image.current_subimage(), 0, first, stop, kind)
     if samples is None or image.has_error or samples.size != spec.height * spec.width * (stop - first):
-        raise MediaError(f"{path.name}: cannot be decoded ({_told(image.geterror, path, 'its data are damaged')})")
+        raise MediaError(f"{path.name}: cannot be decoded ({_told(image.geterror(), path, 'its data are damaged')})")
     samples = samples.reshape(spec.height, spec.width, stop - first)[..., [channel - first for channel in layer]]
     return samples.astype(_dtype(spec), copy=False)
 
 
-def _told(geterror: Callable[[], str], path: Path, otherwise: str) -> str:
-    """Return OpenImageIO's message of an error in a file, for use inside a sentence. It may quote bytes."""
-    try:
-        text = geterror()
-    except UnicodeDecodeError as error:
-        text = _as_text(error)
+def _told(text: str, path: Path, otherwise: str) -> str:
+    """Return OpenImageIO's message of an error in a file, for use inside a sentence."""
     return " ".join(text.replace(str(path), path.name).split()).partition(". ")[0] or otherwise
-
-
-def _as_text(error: UnicodeDecodeError) -> str:
-    return error.object.decode(errors="replace")
 
 
 def no_channel(path: Path, channel: str, names: Iterable[str]) -> MediaError:
     """Return the error for a file without a channel, which names others."""
-    names = list(names)
-    others = len(names) - _TOLD
-    told = ", ".join(names[:_TOLD]) + (f" and {others} others" if others > 0 else "")
-    return MediaError(f"{path.name}: has no channel {channel}, but {told}")
+    return MediaError(f"{path.name}: has no channel {channel}, but {', '.join(names)}")

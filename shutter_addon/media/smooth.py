@@ -14,12 +14,12 @@ import numpy as np
 from ..core.frames.frame_source import FrameSource, SourceWrapper
 from ..core.frames.planes import Decoded, Moment, as_rgba
 from ..core.memo import Kept
+from ..core.messages import MediaError
 from ..core.model.motions import Similarity
 from ..core.model.shutters import MAX_WINDOW
 from . import flow, opencv, steps
 from .cuts import may_be_cut
 from .derived import StoredVectors
-from .errors import MediaError
 from .files import check_index
 
 SMOOTH = 1, 2, 4, 8, 16  # moments from a filmed frame to the next
@@ -63,7 +63,7 @@ class Repeats:
     def _change(self, index: int) -> float:
         """By how many levels a frame differs from the one before; infinitely where that is none, or of another shot;
         "not a number" where that cannot be told."""
-        if index == 0:
+        if index in (0, self._source.count):
             return math.inf
         try:
             return self._changes.ask(index, lambda: self._found(index), _CHANGES)
@@ -71,8 +71,6 @@ class Repeats:
             return math.nan
 
     def _found(self, index: int) -> float:
-        if index == self._source.count:
-            return math.inf
         before, after = self._picture(index - 1), self._picture(index)
         if may_be_cut(*(np.dstack([picture] * 3) for picture in (before, after))):
             return math.inf
@@ -100,7 +98,7 @@ class SmoothSource(SourceWrapper):
     ) -> None:
         self._recent = lru_cache(_FRAMES)(source.read)
         super().__init__(SourceWrapper(source, self._recent))
-        flow.check()
+        opencv.check("moments between frames need")
         self._find = flow.found if vectors is None else vectors.found
         self.step = step
         self.count = (source.count - 1) * step + 1

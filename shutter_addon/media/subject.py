@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from ..core import stopping
+from ..core.messages import MediaError, of_file
 from ..core.model import scribbles
-from . import carrying, derived, flow, opencv
-from .errors import MediaError
+from . import carrying, flow
 from .opencv import cv2
 
 MODEL = Path(__file__).resolve().parents[2] / "models" / "u2netp.onnx"
@@ -56,19 +56,6 @@ class Found:
     confidence: float
 
 
-def model_path(preference: str = "") -> Path:
-    """Return the file of the network: that of the preference, or the one that Virtual Shutter brings."""
-    return Path(preference).expanduser() if preference else MODEL
-
-
-def digest(path: Path) -> str:
-    """Return what tells the file of a network from others. MediaError: it cannot be read."""
-    try:
-        return derived.content_digest(path, whole=1 << 40).hex()
-    except MediaError:
-        raise MediaError(f"{path}: the model that finds subjects cannot be read") from None
-
-
 class Network:
     """A network with one picture in and one mask out. One thread at a time may use it."""
 
@@ -76,17 +63,14 @@ class Network:
         """Read a network from an ONNX file.
 
         Raises:
-            MediaError: The file is missing, damaged, or another kind of network, or OpenCV is missing.
+            MediaError: The file is missing, damaged, or another kind of network.
         """
-        opencv.check("subjects are found by", "ximgproc")
         self._name = path.name
         try:
-            content = path.read_bytes()
-        except OSError:
-            raise MediaError(f"{path}: the model that finds subjects cannot be read") from None
-        try:
-            self._net = cv2.dnn.readNetFromONNX(np.frombuffer(content, np.uint8))
+            self._net = cv2.dnn.readNetFromONNX(np.fromfile(path, np.uint8))
             sizes = _INPUT.findall(self._net.dump())
+        except OSError as error:
+            raise MediaError(of_file(error)) from None
         except cv2.error:
             raise MediaError(f"{path.name}: is damaged, or no ONNX model that OpenCV can run") from None
         if not sizes:
@@ -142,15 +126,11 @@ def refined(picture: np.ndarray, share: np.ndarray) -> np.ndarray:
     return carrying.refined(picture, np.maximum(share - np.float32(INSIDE - carrying.INSIDE), 0))
 
 
-def covered(strokes: Sequence[Any], width: float, picture: np.ndarray) -> np.ndarray:
-    """Return which pixels (h, w) bool of a picture strokes cover.
-
-    Args:
-        width: Of the strokes, in parts of the picture's height.
-    """
+def covered(strokes: Sequence[Any], picture: np.ndarray) -> np.ndarray:
+    """Return which pixels (h, w) bool of a picture strokes cover."""
     points = tuple(np.asarray(stroke, np.float64) for stroke in strokes)
     height, breadth = picture.shape[:2]
-    return scribbles.rasterise([scribbles.Shape(0, "line", width, points)], breadth, height) > 0
+    return scribbles.rasterise([scribbles.Shape(0, "line", WIDTH, points)], breadth, height) > 0
 
 
 def found(network: Network, picture: np.ndarray, on: np.ndarray, off: np.ndarray) -> Found | None:
@@ -240,13 +220,7 @@ def _alone(answer: np.ndarray, keep: np.ndarray) -> np.ndarray:
     return np.where(keep | (_near(keep) & (answer <= INSIDE)), answer, np.float32(0))
 
 
-def _agreed(one: np.ndarray, other: np.ndarray) -> float:
-    return float(np.minimum(one, other).sum() / max(np.maximum(one, other).sum(), 1e-6))
-
-
-def followed(
-    network: Network, before: np.ndarray, picture: np.ndarray, subject: Found
-) -> tuple[Found, np.ndarray | float]:
+def followed(network: Network, before: np.ndarray, picture: np.ndarray, subject: Found) -> tuple[Found, np.ndarray]:
     """Return a subject in the frame behind one, carried there by motion and corrected by the network; and the share
     (h, w) of the matte before that it keeps.
 
@@ -259,14 +233,14 @@ def followed(
     back = flow.fine_vectors(greys[1], greys[0])
     carried, excluded = (flow.look(each, grid + back) for each in (subject.share, subject.excluded))
     if not (carried > INSIDE).any():
-        return Found(carried, excluded, 0.0), 0.0
+        return Found(carried, excluded, 0.0), np.zeros_like(carried)
     answer = network.within(picture, around(carried > INSIDE, ROOM), QUICK) * (1 - excluded)
     _, parts = cv2.connectedComponents((answer > INSIDE).astype(np.uint8))
     sizes = np.bincount(parts.ravel())
     keep = np.bincount(parts.ravel(), weights=(carried > INSIDE).ravel()) >= SHARED * sizes
     keep[0] = False
     answer = _alone(answer, keep[parts])
-    agrees = _agreed(answer, carried)
+    agrees = float(np.minimum(answer, carried).sum() / max(np.maximum(answer, carried).sum(), 1e-6))
     sure = float(answer[answer > INSIDE].mean()) if (answer > INSIDE).any() else 0.0
     trust = MOST * _from(agrees, BELIEVED)
     share = carried + np.float32(trust) * (answer - carried)

@@ -8,11 +8,11 @@ a process begins. Between two keyframes, both chains are mixed in the middle.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -20,11 +20,10 @@ from ..core import stopping
 from ..core.frames.frame_source import FrameSource
 from ..core.model import outlines
 from . import carrying, derived, flow, opencv
-from .carried_mattes import CONFIDENCE, CarriedMattes, Footage, nearest
+from .carried_mattes import CONFIDENCE, CarriedMattes, nearest
 from .image_writing import write_levels
 from .opencv import cv2
-from .outlining import traced
-from .subject import MODEL, Found, Network, covered, digest, followed, found, refined, without
+from .subject import MODEL, WIDTH, Found, Network, covered, followed, found, refined, without
 
 VERSION = 1  # raise it when mattes of the same strokes change
 EXCLUDED = 1  # the level of what strokes say that the subject is not
@@ -42,12 +41,10 @@ class Subject:
 
     Attributes:
         strokes, nots: By source frame, arrays of points (n, 2) in fractions of the picture, y up.
-        width: Of the strokes, in parts of the picture's height.
     """
 
     strokes: Strokes = field(hash=False)
     nots: Strokes = field(hash=False)
-    width: float
 
     def __post_init__(self) -> None:
         for name in ("strokes", "nots"):  # as plain tuples, which can be compared
@@ -55,24 +52,36 @@ class Subject:
             object.__setattr__(self, name, drawn)
 
 
+class Footage(Hashable, Protocol):
+    """What opens the source; equal where it gives the same frames."""
+
+    def open(self) -> FrameSource: ...
+
+
 @dataclass(frozen=True)
-class SubjectFile:
-    """A core.model.mattes.MatteFile of a subject; see carried_mattes.CarriedFile.
+class CarriedFile:
+    """A core.model.mattes.MatteFile of an outline or a subject.
 
     Attributes:
-        model: The file of the network.
+        drawings: By ascending source frame, the curves of each (core.model.outlines).
+        folder: Where mattes are kept. If it is None or cannot be written to, they are kept while this program runs.
+        subject: The strokes of a subject; None: an outline.
+        model: The file of the network that finds subjects.
     """
 
     footage: Footage
-    subject: Subject
-    drawings: tuple[tuple[int, outlines.Curves], ...] = field(default=(), hash=False)
+    # Each frame of a window asks for the hash; drawings may have thousands of points.
+    drawings: tuple[tuple[int, outlines.Curves], ...] = field(hash=False)
     folder: Path | None = None
+    subject: Subject | None = None
     model: Path = MODEL
 
-    def open(self) -> SubjectMattes:
+    def open(self) -> CarriedMattes:
         """MediaError: the footage or the network cannot be read, or OpenCV is missing."""
-        opencv.check("subjects are found by", "ximgproc")
-        return SubjectMattes(self.footage.open(), self.subject, self.drawings, self.folder, self.model)
+        opencv.check("subjects are found by" if self.subject else "outlines are tracked by", "ximgproc")
+        if self.subject is None:
+            return CarriedMattes(self.footage.open(), self.drawings, self.folder)
+        return SubjectMattes(self.footage.open(), self.drawings, self.folder, self.subject, self.model)
 
 
 class SubjectMattes(CarriedMattes):
@@ -81,18 +90,18 @@ class SubjectMattes(CarriedMattes):
     def __init__(
         self,
         source: FrameSource,
+        drawings: tuple[tuple[int, outlines.Curves], ...],
+        folder: Path | None,
         subject: Subject,
-        drawings: tuple[tuple[int, outlines.Curves], ...] = (),
-        folder: Path | None = None,
-        model: Path | None = None,
+        model: Path,
     ) -> None:
         super().__init__(source, drawings, folder)
-        self._subject, self._model, self._digest = subject, model or MODEL, digest(model or MODEL)
+        self._subject, self._model, self._digest = subject, model, derived.content_digest(model, whole=1 << 40).hex()
         drawn = set(self._keys)
         strokes, nots = subject.strokes, subject.nots
         for frame in {*strokes, *nots} - drawn:
             if 0 <= frame < self.count:
-                made_of = [strokes.get(frame, ()), nots.get(frame, ()), subject.width]
+                made_of = [strokes.get(frame, ()), nots.get(frame, ()), WIDTH]
                 self._keys[frame] = derived.key({"frame": frame, "strokes": made_of})
         # What a keyframe with nothing but strokes of what the subject is not shows depends on the others.
         self._showing = {frame: key for frame, key in self._keys.items() if frame in drawn or frame in strokes}
@@ -104,32 +113,27 @@ class SubjectMattes(CarriedMattes):
     def read(self, index: int) -> np.ndarray:
         """As CarriedMattes.read. MediaError: the network cannot be read, too."""
         index = min(max(index, 0), self.count - 1)
-        sides = self._sides(index, self._sure_once_made) or []
+        sides = self._sides(index, makes=True) or []
         mattes = [(self._kept(path), share) for path, share, _sure in sides]
         shown = [(np.where(it == EXCLUDED, 0, it) / np.float32(255), share) for it, share in mattes if it is not None]
         return mixed(shown) if shown else self._nothing()
 
     def has(self, index: int) -> bool:
-        return self._sides(index, self._sure) is not None
+        return self._sides(index) is not None
 
     def confidence(self, index: int) -> float | None:
-        sides = self._sides(index, self._sure)
+        sides = self._sides(index)
         if sides is None:
             return None
         if all(sure == GONE for _path, _share, sure in sides):  # nothing is there, surely
             return 1.0
         return sum(share * sure for _path, share, sure in sides)
 
-    def curves(self, index: int) -> outlines.Curves:
-        if index in self._drawings:
-            return self._drawings[index]
-        return traced(self.read(index)) if self.has(index) else outlines.curves(self._straight(index))
-
-    def _sides(self, index: int, get: Callable[[int, int], float | None]) -> list[tuple[Path, float, float]] | None:
+    def _sides(self, index: int, *, makes: bool = False) -> list[tuple[Path, float, float]] | None:
         """Return the files that a matte is mixed of, with their shares and confidences; None if one is missing.
 
         Args:
-            get: Gives the confidence of a frame's matte in the chain of a keyframe, or None.
+            makes: Make what is missing.
         """
         ends = sorted({end for end in self._near(index) if end is not None}, key=lambda end: abs(end - index))
         span = sum(abs(end - index) for end in ends)
@@ -138,7 +142,11 @@ class SubjectMattes(CarriedMattes):
             share = min(max(MIDDLE * (0.5 - abs(end - index) / span) + 0.5, 0.0), 1.0) if len(ends) > 1 else 1.0
             if share == 0 and sides[0][2] != GONE:
                 break  # the nearest keyframe alone counts
-            if (sure := get(index, end)) is None:
+            if makes and self._sure(index, end) is None:
+                with self._claimed(index, end, None) as kept:
+                    if kept is None:
+                        self._make(index, end)
+            if (sure := self._sure(index, end)) is None:
                 return None
             weight = 0.0 if sure == GONE else max(share, _LEAST) * max(sure, _LEAST)
             sides.append((self._path(index, end, None), weight, sure))
@@ -148,14 +156,6 @@ class SubjectMattes(CarriedMattes):
     def _sure(self, index: int, end: int) -> float | None:
         """Return the confidence of a frame's matte in the chain of a keyframe; None if it is not kept."""
         return self._described(self._path(index, end, None))
-
-    def _sure_once_made(self, index: int, end: int) -> float | None:
-        """As `_sure`; makes what is missing of the chain."""
-        if self._sure(index, end) is None:
-            with self._claimed(index, end, None) as kept:
-                if kept is None:
-                    self._make(index, end)
-        return self._sure(index, end)
 
     def _make(self, index: int, end: int) -> None:
         """Make the mattes of a chain from the last one on that is kept."""
@@ -171,7 +171,7 @@ class SubjectMattes(CarriedMattes):
         self._shots.release()
 
     def _write(self, frame: int, end: int, matte: np.ndarray, excluded: np.ndarray, sure: float) -> None:
-        levels = carrying.levels(matte)
+        levels = flow.levels(matte)
         levels[levels == EXCLUDED] = EXCLUDED + 1
         levels[(levels < EXCLUDED) & (_fitted(excluded, levels) > 0.5)] = EXCLUDED
         write_levels(self._path(frame, end, None), levels, f"{CONFIDENCE}{sure:.3f}")
@@ -183,7 +183,7 @@ class SubjectMattes(CarriedMattes):
         if frame in self._drawings:
             return carrying.drawn(picture, self._drawing(frame).cover) / np.float32(255), nothing, 1.0
         strokes = (each.get(frame, ()) for each in (self._subject.strokes, self._subject.nots))
-        on, off = (covered(each, self._subject.width, small) for each in strokes)
+        on, off = (covered(each, small) for each in strokes)
         if frame in self._showing:
             what = found(self._network, small, on, off) or Found(on.astype(np.float32), nothing, 0.0)
         else:
@@ -218,7 +218,7 @@ class SubjectMattes(CarriedMattes):
         """Return the subject in a frame as it is without the strokes there."""
         nots = {each: strokes for each, strokes in self._subject.nots.items() if each in self._showing}
         drawings, subject = tuple(self._drawings.items()), replace(self._subject, nots=nots)
-        mattes = SubjectMattes(self._source, subject, drawings, self._parent, self._model)
+        mattes = SubjectMattes(self._source, drawings, self._parent, subject, self._model)
         share = flow.resized(mattes.read(frame), carrying.working_size(self.width, self.height))
         return Found(share, np.zeros_like(share), mattes.confidence(frame) or 0.0)
 
@@ -232,10 +232,6 @@ class SubjectMattes(CarriedMattes):
     def _drawn(self, first: int | None, last: int | None) -> list[str]:
         return [*super()._drawn(first, last), f"subject {VERSION}", self._digest]
 
-    def _straight(self, index: int) -> list[np.ndarray]:
-        """As CarriedMattes has it, of the drawings; none stands in for a subject that has none."""
-        return CarriedMattes(self._source, tuple(self._drawings.items()))._straight(index)
-
 
 def mixed(mattes: list[tuple[np.ndarray, float]]) -> np.ndarray:
     """Return the mean (H, W) of one or two mattes by their shares, less soft where they differ."""
@@ -247,6 +243,6 @@ def mixed(mattes: list[tuple[np.ndarray, float]]) -> np.ndarray:
     return np.clip((mean - 0.5) * steep + 0.5, 0, 1) if share + rest else mean
 
 
-def _fitted(values: np.ndarray | float, matte: np.ndarray) -> np.ndarray | float:
+def _fitted(values: np.ndarray, matte: np.ndarray) -> np.ndarray:
     """Return values (h, w) for each pixel of a matte (H, W)."""
-    return values if isinstance(values, float) else cv2.resize(values, matte.shape[::-1])
+    return cv2.resize(values, matte.shape[::-1])

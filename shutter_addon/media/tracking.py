@@ -6,16 +6,17 @@ last frame in which the subject was surely found.
 
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 
+from ..core.messages import MediaError
 from ..core.model import motions, scribbles
 from ..core.model.effect import Region, Subject
 from ..core.model.motions import Motion, Placement, Similarity
 from . import registration
-from .errors import MediaError
 from .footage import Footage
 from .pursuit import PartPursuit, Sighting, distinctness
 from .registration import Part
@@ -72,7 +73,6 @@ class Track(ABC):
     def __init__(self, subject: Subject) -> None:
         """Track a subject. Its placement is known at the first frame and at anchors."""
         self._subject = subject
-        self._parts: dict[int, tuple[Part, float]] = {}
 
     def follow(
         self,
@@ -110,30 +110,16 @@ class Track(ABC):
             raise TrackingError(NOT_SHOWN)
         if len(frames) < 2:
             raise TrackingError(ALONE)
-        self._check(start)
+        self._pursuit(start)
         return self._both_ways(start, range(min(frames), max(frames) + 1), {*anchors} - {start})
 
-    def part(self, frame: int) -> tuple[Part, float]:
-        """Return the subject's part of a frame, and the confidence that its corners belong to it.
+    @abstractmethod
+    def _pursuit(self, start: int) -> tuple[Pursuit, float]:
+        """Return the pursuit of what `start` shows, and the confidence that this is the subject.
 
         Raises:
             TrackingError: there is nothing to follow
         """
-        if frame not in self._parts:
-            self._parts[frame] = self._part(frame)
-        return self._parts[frame]
-
-    def _part(self, frame: int) -> tuple[Part, float]:
-        """Make the result of `part`, which caches it."""
-        raise NotImplementedError
-
-    def _check(self, frame: int) -> None:
-        """Raise TrackingError if there is nothing to follow at a frame."""
-        self.part(frame)
-
-    @abstractmethod
-    def _pursuit(self, start: int) -> tuple[Pursuit, float]:
-        """Return the pursuit of what `start` shows, and its confidence."""
 
     def _both_ways(self, start: int, frames: range, anchors: set[int]) -> Iterator[Tracked]:
         yield Tracked(frame=start, placement=self._subject.placement(start), confidence=1.0)
@@ -162,7 +148,7 @@ class Track(ABC):
             else:
                 there[tracked.frame] = tracked
                 yield tracked
-        if self._has_part(anchor):  # else only what was tracked from the start counts
+        with suppress(TrackingError):  # of the anchor: only what was tracked from the start counts
             returning = list(self._from(anchor, range(anchor - step, start, -step)))
             back = {tracked.frame: tracked for tracked in returning if not tracked.fault}
             faults += [tracked for tracked in returning if tracked.fault]
@@ -199,13 +185,6 @@ class Track(ABC):
         if lost:
             yield Tracked(frame=lost[0], placement=last.placement, confidence=0.0, fault=pursuit.reason)
 
-    def _has_part(self, frame: int) -> bool:
-        try:
-            self._check(frame)
-        except TrackingError:
-            return False
-        return True
-
     def _carried(self, origin: int, frame: int, motion: Similarity, near: Placement) -> Placement:
         before, after = self._centres[origin], self._centres[frame]
         moved = motions.carried(self._placement(origin), motion, before, after, self._footage.size)
@@ -226,8 +205,15 @@ class RegionTrack(Track):
 
     _subject: Region
 
+    def __init__(self, region: Region) -> None:
+        super().__init__(region)
+        self._parts: dict[int, tuple[Part, float]] = {}  # by start: both directions learn what belongs to it
+
     def _part(self, frame: int) -> tuple[Part, float]:
-        """See Track. Corners far from the region may belong to something else; so may those of a repeated pattern."""
+        """Return the part of a frame that the region covers, and the confidence that its corners belong to it.
+
+        Corners far from the region may belong to something else; so may those of a repeated pattern.
+        """
         shape, (width, height) = self._subject.at(frame), self._footage.size
         covered = scribbles.rasterise([replace(shape, shutter=0)], width, height) > 0
         if not covered.any():
@@ -243,7 +229,9 @@ class RegionTrack(Track):
         return part, min(float(np.clip(near / _ENOUGH_NEAR, _FAR, 1)), distinctness(part, width))
 
     def _pursuit(self, start: int) -> tuple[PartPursuit, float]:
-        part, worth = self.part(start)
+        if start not in self._parts:
+            self._parts[start] = self._part(start)
+        part, worth = self._parts[start]
         return PartPursuit(part, self._footage, start, self._motion), worth
 
 

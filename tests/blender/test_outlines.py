@@ -10,7 +10,8 @@ from shutter_addon.blender.editing import outline_drawings
 from shutter_addon.blender.rendering import outline_carrying, sessions
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import outlines
-from shutter_addon.media.carried_mattes import CarriedFile, CarriedMattes
+from shutter_addon.media.carried_mattes import CarriedMattes
+from shutter_addon.media.subject_mattes import CarriedFile
 
 WIDTH, HEIGHT, COUNT = 96, 64, 12
 OPTIONS = {"light": "encoded", "interpolation": "value"}

@@ -4,10 +4,9 @@ import threading
 import pytest
 
 from shutter_addon.core import threads, told
-from shutter_addon.core.messages import EffectError
+from shutter_addon.core.messages import EffectError, MediaError
 from shutter_addon.core.recipes import recipe_file
 from shutter_addon.core.recipes.recipe import RecipeError
-from shutter_addon.media.errors import MediaError
 from shutter_addon.media.files import check_file
 
 

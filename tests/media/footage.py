@@ -2,14 +2,35 @@
 
 import struct
 from fractions import Fraction
+from pathlib import Path
 
 import av
 import numpy as np
 from OpenImageIO import ImageOutput, ImageSpec
 
+from shutter_addon.core.frames.frame_source import FrameSource
+from shutter_addon.core.messages import MediaError
+
 WIDTH, HEIGHT, BLOCK = 128, 64, 16
 COUNT = 36
 VARIABLE = [n * n // 8 + n for n in range(24)]  # when a frame begins, in 25ths of a second
+
+
+class Film(FrameSource):
+    """Frames of a function of their number. It notes which are read; `lost` ones cannot be."""
+
+    transfer, alpha, options, fps, path = "srgb", "opaque", {}, 25, Path("film.mov")
+
+    def __init__(self, shows, count):
+        self.shows, self.count, self.asked, self.lost = shows, count, [], set()
+        first = shows(0)
+        (self.height, self.width), self.dtype = first.shape[:2], first.dtype
+
+    def read(self, index):
+        if index in self.lost:
+            raise MediaError(f"frame {index} is lost")
+        self.asked.append(index)
+        return self.shows(index)
 
 
 def picture(number, width=WIDTH, height=HEIGHT):

@@ -9,9 +9,9 @@ import pytest
 from test_tracking import ASSETS, HEIGHT, MIDDLE, PIXEL, SIZE, WIDTH, Film, ellipse, still, warped
 
 from shutter_addon.core.model import motions
-from shutter_addon.core.model.effect import STILL_CAMERA, Camera, Drawings, Moves, Region
+from shutter_addon.core.model.effect import STILL_CAMERA, Drawings, Moves, Region
 from shutter_addon.core.model.keyframes import Constant, Keys
-from shutter_addon.core.model.motions import Placement, Similarity
+from shutter_addon.core.model.motions import Similarity
 from shutter_addon.media import camera_tracking, open_source, pursuit, tracking
 from shutter_addon.media.footage import Footage
 
@@ -110,15 +110,6 @@ def test_a_camera_that_pans_is_found_from_later_frames():
     assert max(error(found, truth, frame, frame + 10) for frame in range(18)) < 0.4
 
 
-@pytest.mark.parametrize(("motion", "turned", "scaled"), [("location", 0, 0), ("rotation", 1, 0), ("scale", 1, 1)])
-def test_only_what_is_asked_for_changes(motion, turned, scaled):
-    found, _ = tracked(film(6)[0], motion=motion)
-    placements = [each.placement for each in found.values()]
-    assert (np.ptp([p.rotation for p in placements]) > 0.5) == turned
-    assert (np.ptp([p.scale for p in placements]) > 0.005) == scaled
-    assert np.ptp([p.location[0] for p in placements]) > 0.01
-
-
 def test_frames_that_show_nothing_of_it_are_bridged_and_many_end_it(monkeypatch):
     source, truth = film(12)
     for n in (4, 5):
@@ -146,22 +137,6 @@ def test_behind_a_jump_it_goes_on_from_where_it_was(monkeypatch):
     step = np.subtract(*(found[n].placement.location for n in (20, 8)))
     expected = np.subtract(*(alone[n].placement.location for n in (12, 0)))
     assert step == pytest.approx(expected, abs=1e-3)
-
-
-def test_it_goes_on_from_where_it_is_and_meets_a_key_that_is_right():
-    """Between the start and the other key both count."""
-    source, truth = film(11)
-    start, key = Placement((0.1, -0.2), 30.0, 2.0), Placement((0.1, 0.1), 30.0, 2.0)
-    keys = [Keys((2, 10), ends, ("linear",) * 2) for ends in zip(*map(numbers, (start, key)), strict=True)]
-    found, _ = tracked(source, start=2, camera=Camera(Moves(*keys)), anchors=[10])
-    assert (found[2].placement, found[10].placement) == (start, key)
-    assert error(found, truth, 2, 3) > 5, "which has to come to the key"
-    free, _ = tracked(source, start=2, camera=Camera(Moves(*keys)))
-    assert max(error(free, truth, 2, n) for n in free) < 0.15
-
-
-def numbers(placement):
-    return placement.location, placement.rotation, placement.scale
 
 
 @pytest.mark.parametrize("share", [0.5, 1.0])

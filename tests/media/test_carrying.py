@@ -7,15 +7,17 @@ from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 
 import cv2
+import footage
 import numpy as np
 import pytest
 
 from shutter_addon.core.frames.light import to_encoded, to_linear
+from shutter_addon.core.messages import MediaError
 from shutter_addon.core.model import outlines
 from shutter_addon.core.model.mattes import FileFrame, Matte
 from shutter_addon.media import carried_mattes, carrying, matte_tracking, outlining
-from shutter_addon.media.errors import MediaError
 from shutter_addon.media.matte_values import MatteValues
+from shutter_addon.media.subject_mattes import CarriedFile
 
 WIDTH, HEIGHT, COUNT = 192, 128, 14
 
@@ -60,33 +62,21 @@ def picture(frame):
     return np.rint(alpha * skin(frame) + (1 - alpha) * ground(frame)).astype(np.uint8)
 
 
-class Footage:
-    """Frames of the scene, or of another ground from a cut on, as a source; read: those that were asked for."""
-
-    transfer, alpha, dtype, fps, step = "srgb", "opaque", np.dtype(np.uint8), None, 1
-    options = ()
+class Footage(footage.Film):
+    """Frames of the scene, or of another ground from a cut on."""
 
     def __init__(self, folder, count=COUNT, cut=None, shows=picture):
-        self.shows, (self.height, self.width) = shows, shows(0).shape[:2]
-        self.path = folder / "scene.png"
+        self.scene, self.cut, self.path = shows, cut, folder / "scene.png"
         self.path.write_bytes(b"the files of frames")
-        self.files, self.count, self.cut, self.asked = (self.path,), count, cut, []
+        self.files = (self.path,)
+        super().__init__(self.frame, count)
 
     def open(self):
         return self
 
-    def read(self, index):
-        self.asked.append(index)
-        shown = self.shows(index) if self.cut is None or index < self.cut else 255 - self.shows(index)[:, ::-1] // 3
+    def frame(self, index):
+        shown = self.scene(index) if self.cut is None or index < self.cut else 255 - self.scene(index)[:, ::-1] // 3
         return np.dstack([shown, np.full(shown.shape[:2], 255, np.uint8)])
-
-    decoded = read
-
-    def want(self, _indices):
-        pass
-
-    def close(self):
-        pass
 
 
 def iou(matte, frame):
@@ -98,15 +88,15 @@ def drawings(*frames):
     return tuple((frame, outlines.curves(strokes(frame))) for frame in frames)
 
 
-@pytest.fixture
-def footage(tmp_path):
+@pytest.fixture(name="footage")
+def _footage(tmp_path):
     return Footage(tmp_path)
 
 
 @pytest.fixture
 def carried(footage, tmp_path):
     """Opens what is carried from drawings at these frames."""
-    return lambda *frames: carried_mattes.CarriedFile(footage, drawings(*frames), tmp_path / "mattes").open()
+    return lambda *frames: CarriedFile(footage, drawings(*frames), tmp_path / "mattes").open()
 
 
 def test_from_both_sides(carried):
@@ -120,7 +110,7 @@ def test_from_both_sides(carried):
 
 def test_it_ends_at_a_cut(tmp_path):
     footage = Footage(tmp_path, 30, cut=15)
-    mattes = carried_mattes.CarriedFile(footage, drawings(9), tmp_path / "mattes").open()
+    mattes = CarriedFile(footage, drawings(9), tmp_path / "mattes").open()
     assert (mattes.read(13) * truth(13)).sum() > 0.9 * truth(13).sum()
     assert not mattes.read(15).any()
     assert not mattes.read(20).any()
@@ -130,7 +120,7 @@ def test_it_ends_at_a_cut(tmp_path):
 def test_it_fades_where_nothing_like_it_is_seen(tmp_path):
     """From one frame on the subject is gone, behind what is no cut."""
     footage = Footage(tmp_path, shows=lambda frame: picture(frame) if frame < 8 else ground(frame))
-    mattes = carried_mattes.CarriedFile(footage, drawings(4), tmp_path / "mattes").open()
+    mattes = CarriedFile(footage, drawings(4), tmp_path / "mattes").open()
     seen, gone = (mattes.read(frame).mean() for frame in (7, COUNT - 1))
     assert seen > 0.05
     assert gone < 0.1 * seen
@@ -179,7 +169,7 @@ def test_mattes_are_kept(carried, footage, tmp_path):
     again = carried(0, 3, 6)
     assert all((again.read(frame) == first[frame]).all() for frame in range(8))
     assert footage.asked == []
-    changed = carried_mattes.CarriedFile(footage, (*drawings(0, 3), (6, drawings(5)[0][1])), tmp_path / "mattes")
+    changed = CarriedFile(footage, (*drawings(0, 3), (6, drawings(5)[0][1])), tmp_path / "mattes")
     other = changed.open()
     assert all((other.read(frame) == first[frame]).all() for frame in range(4))
     assert footage.asked == []
@@ -202,7 +192,7 @@ def test_mattes_of_another_version_are_left_alone(carried, tmp_path, monkeypatch
 def test_who_shares_a_folder_carries_once(tmp_path):
     """Two that ask at the same time: one carries, the other waits, and reads no frame."""
     both = [Footage(tmp_path) for _ in range(2)]
-    files = [carried_mattes.CarriedFile(footage, drawings(0, 4), tmp_path / "mattes") for footage in both]
+    files = [CarriedFile(footage, drawings(0, 4), tmp_path / "mattes") for footage in both]
     with ThreadPoolExecutor(2) as pool:
         first, second = pool.map(lambda file: file.open().read(2), files)
     np.testing.assert_array_equal(first, second)
@@ -217,7 +207,7 @@ def test_confidence_is_kept(carried, footage):
     mattes.read(2)
     assert mattes.confidence(2) == carried(0, 4).confidence(2) > 0.7
     away = tuple((x + 0.2, y) for x, y in drawings(4)[0][1][0])
-    wrong = carried_mattes.CarriedFile(footage, (*drawings(0), (4, (away,)))).open()
+    wrong = CarriedFile(footage, (*drawings(0), (4, (away,)))).open()
     wrong.read(2)
     assert wrong.confidence(2) < 0.5
 
@@ -253,7 +243,7 @@ def test_traced(off):
 def test_what_stands_in(footage, tmp_path):
     """A reader that has no time takes a straight outline, and tells which matte it lacks; once that is there, it
     counts."""
-    file, late = carried_mattes.CarriedFile(footage, drawings(0, 6), tmp_path / "mattes"), []
+    file, late = CarriedFile(footage, drawings(0, 6), tmp_path / "mattes"), []
     reader = MatteValues(WIDTH, HEIGHT, late=lambda *which: late.append(which))
     matte = Matte(0, FileFrame(file))
     ((first_key, first),) = reader.values((matte,), 3, 1)
@@ -268,21 +258,26 @@ def test_what_stands_in(footage, tmp_path):
     assert reader.values((matte,), 40, 1)[0][1].shape == (HEIGHT, WIDTH)
 
 
+def refused(**_):
+    raise PermissionError
+
+
 def test_a_folder_that_takes_nothing(footage, tmp_path, monkeypatch):
     """Mattes are kept elsewhere then, for all who ask; those that were in it before are read there."""
-    monkeypatch.setattr(carried_mattes, "_elsewhere", {})  # mattes of other tests lie there
-    good = carried_mattes.CarriedFile(footage, drawings(0, 4), tmp_path / "mattes").open()
+    good = CarriedFile(footage, drawings(0, 4), tmp_path / "mattes").open()
     expected = [good.read(frame) for frame in (2, 4)]
     (tmp_path / "file").write_text("")  # where the folder would be: rights refuse root nothing
-    file = carried_mattes.CarriedFile(footage, drawings(0, 4), tmp_path / "file")
+    file = CarriedFile(footage, drawings(0, 4), tmp_path / "file")
     assert not file.open().has(2)
     np.testing.assert_array_equal([file.open().read(frame) for frame in (2, 4)], expected)
     assert file.open().has(2)
-    carried_mattes._use_elsewhere(tmp_path / "mattes")  # as where it may be read alone
+    carried_mattes._writable.cache_clear()  # private: it lasts as long as the program
+    monkeypatch.setattr(tempfile, "TemporaryFile", refused)  # as where it may be read alone
     assert good.has(2)
+    carried_mattes._temporary.cache_clear()  # private: as before
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "file"))
     with pytest.raises(MediaError, match="mattes cannot be written anywhere"):
-        carried_mattes.CarriedFile(footage, drawings(0, 4), tmp_path / "file" / "other").open().read(2)
+        CarriedFile(footage, drawings(0, 4), tmp_path / "file" / "other").open().read(2)
 
 
 @pytest.mark.parametrize("size", [(4, 4), (8, 8), (12, 1920), (1920, 24)])

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
+from shutter_addon.core.messages import MediaError
 from shutter_addon.core.model.mattes import FileFrame, Matte, Ramp
 from shutter_addon.media import matte_values
-from shutter_addon.media.errors import MediaError
 from shutter_addon.media.matte_values import MatteValues
 
 WIDTH, HEIGHT, COUNT = 11, 6, 5

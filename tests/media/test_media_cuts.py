@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from footage import Film
 
-from shutter_addon.core.frames.frame_source import FrameSource
-from shutter_addon.media import MediaError, open_source
+from shutter_addon.media import open_source
 from shutter_addon.media.cuts import NEIGHBOURS, ShotSource, is_cut, signature
 
 ROOT = Path(__file__).parents[2]
@@ -91,44 +91,34 @@ def test_small_frames():
     assert signature(np.zeros((2160, 16, 4), np.float16), "linear").shape == (18, 16, 3)
 
 
-class Frames(FrameSource):
-    transfer, alpha = "srgb", "opaque"
-
-    def __init__(self, frames):
-        self.frames, self.count, self.reads = frames, len(frames), []
-
-    def read(self, index):
-        self.reads.append(index)
-        if self.frames[index] is None:
-            raise MediaError("broken")
-        return self.frames[index].copy()
+def as_source(frames):
+    return Film(lambda index: frames[index].copy(), len(frames))
 
 
 def test_shots_end_at_cuts_and_at_the_clips_ends(film):
     frames = [*film[:10], *noise(8, 10), *film[90:100, :, ::-1]]
-    shots = ShotSource(Frames(frames))
+    shots = ShotSource(as_source(frames))
     for index, shot in ((0, range(10)), (9, range(10)), (10, range(10, 18)), (17, range(10, 18)), (27, range(18, 28))):
         assert shots.around(index, -5, 40) == shot
-        assert ShotSource(Frames(frames)).around(index, index - 11, index + 11) == shot
+        assert ShotSource(as_source(frames)).around(index, index - 11, index + 11) == shot
         assert shots.around(index, index, index) == range(28)
 
 
 def test_where_a_frame_cannot_be_read_there_is_no_cut(film):
-    frames = [*film[:10], *noise(8, 11)]
-    frames[4] = None
-    assert ShotSource(Frames(frames)).around(2, 0, 17) == range(10)
-    frames[9] = None
-    assert ShotSource(Frames(frames)).around(2, 0, 17) == range(18)
+    for lost, shot in (({4}, range(10)), ({4, 9}, range(18))):
+        source = as_source([*film[:10], *noise(8, 11)])
+        source.lost = lost
+        assert ShotSource(source).around(2, 0, 17) == shot
 
 
 @pytest.mark.parametrize("lost", [9, 10, 4])
 def test_what_a_lost_frame_hid_is_found_when_it_is_back(film, lost):
     """Whether it lay at the cut or beside it, and though the same object looked for the cut before."""
-    frames = [*film[:10], *noise(8, 11)]
-    source = Frames([None if i == lost else frame for i, frame in enumerate(frames)])
+    source = as_source([*film[:10], *noise(8, 11)])
+    source.lost = {lost}
     shots = ShotSource(source)
     shots.around(2, 0, 17)
-    source.frames = frames
+    source.lost = set()
     assert shots.around(2, 0, 17) == range(10)
     assert shots.lacking(2, 0, 9) == set()
 
@@ -136,7 +126,7 @@ def test_what_a_lost_frame_hid_is_found_when_it_is_back(film, lost):
 def test_frames_that_nobody_reads_are_let_go(film):
     """A look through a whole film, as for its shots, keeps those around the last window."""
     for step in (1, 8):
-        shots = ShotSource(Frames(film.repeat(step, 0)[: 131 * step + 1]), step)
+        shots = ShotSource(as_source(film.repeat(step, 0)[: 131 * step + 1]), step)
         for index in range(shots.count):
             shots.around(index, index, index + 3)
             low, high = index - NEIGHBOURS * step, index + 3 + NEIGHBOURS * step

@@ -9,7 +9,7 @@ from pathlib import Path
 import av
 import numpy as np
 import pytest
-from footage import COUNT, HEIGHT, WIDTH, cut_file, damage_frame, make_movie, number, picture
+from footage import HEIGHT, WIDTH, cut_file, damage_frame, make_movie, number, picture
 
 from shutter_addon.media import MediaError, PrefetchSource, open_source
 
@@ -88,28 +88,6 @@ def test_arrays_belong_to_the_caller(movies):
         assert first.flags.c_contiguous
         assert first.flags.writeable
         assert first.shape == (HEIGHT, WIDTH, 4)
-
-
-@pytest.mark.parametrize("size", [(1, 1), (33, 17), (130, 66)])
-@pytest.mark.parametrize("pix_fmt", ["yuv420p", "yuv444p", "yuv420p10le"])
-def test_odd_sizes(tmp_path, size, pix_fmt):
-    width, height = size
-    arrays = [np.full((height, width, 3), 40 * n, np.uint8) for n in range(5)]
-    path = make_movie(tmp_path / "odd.mkv", "ffv1", pix_fmt=pix_fmt, size=size, pictures=arrays)
-    with open_source(path) as source:
-        frames = all_frames(source)
-        top = np.iinfo(source.dtype).max
-    for array, frame in zip(arrays, frames, strict=True):
-        assert frame.shape == (height, width, 4)
-        assert np.abs(frame[..., :3] / top - array / 255).max() < 2 / 255
-        assert (frame[..., 3] == top).all()
-
-
-def test_what_a_movie_says_of_itself(movies):
-    with open_source(movies["ntsc.mov"][0]) as source:
-        assert (source.width, source.height, source.count) == (WIDTH, HEIGHT, COUNT)
-        assert source.fps * 1001 == 30000
-        assert (source.dtype, source.transfer, source.alpha) == (np.uint8, "srgb", "opaque")
 
 
 def test_deep_movies_keep_their_depth(tmp_path):

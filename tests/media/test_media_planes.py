@@ -11,8 +11,8 @@ from shutter_addon.compute.running_sums import Sums
 from shutter_addon.core.frames.planes import Planes
 from shutter_addon.core.model.frame_state import Options
 from shutter_addon.devices.device import NoDeviceError
-from shutter_addon.media import MediaError, PrefetchSource, movie, open_source
-from shutter_addon.media.cuts import ShotSource, signature
+from shutter_addon.media import open_source
+from shutter_addon.media.cuts import signature
 
 ALL = slice(None), slice(None)
 SIZES = (64, 48), (65, 47), (37, 33), (322, 181), (17, 16)
@@ -92,29 +92,6 @@ def test_other_frames_are_as_they_are_read(tmp_path, pixels, space, given):
     path = film(tmp_path / "noise.mkv", (64, 48), space, LIMITED, pixels)
     with open_source(path, **given) as source:
         assert np.array_equal(source.decoded(1), source.read(1))
-
-
-def test_a_conversion_that_fails_is_said_of_its_frame(bunny, monkeypatch):
-    class Failing:
-        def reformat(self, *_):
-            raise av.error.MemoryError(12, "Cannot allocate memory")
-
-    monkeypatch.setattr(movie, "VideoReformatter", Failing)
-    with open_source(bunny) as source:
-        planes = source.decoded(5)
-        for converted in (planes.rgba, lambda: source.read(5)):
-            with pytest.raises(MediaError, match=r"^frame 5 of .* cannot be decoded"):
-                converted()
-
-
-@pytest.mark.parametrize("planes", [True, False])
-def test_through_wrappers(bunny, planes):
-    with open_source(bunny) as direct, ShotSource(PrefetchSource(open_source(bunny), planes=planes)) as source:
-        source.want(range(4))
-        source.around(1, 0, 3)
-        for index in range(4):
-            assert isinstance(source.decoded(index), Planes) == planes
-            assert np.array_equal(source.read(index), direct.read(index))
 
 
 def test_a_signature_of_planes_is_that_of_the_frame(bunny):

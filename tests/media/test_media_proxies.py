@@ -1,13 +1,12 @@
 """Footage read from proxies: which may stand for it, and what is read where they do not."""
 
-from functools import partial
-
 import numpy as np
 import OpenImageIO
 import pytest
 from footage import COUNT, HEIGHT, WIDTH, cut_file, damage_frame, make_movie, number, picture, rotate_movie, see_through
 
-from shutter_addon.media import open_source, opening
+from shutter_addon.media import open_source
+from shutter_addon.media.opening import with_proxy
 
 CLEAR = {"pix_fmt": "argb", "pictures": [see_through(n) for n in range(COUNT)], "array_format": "rgba"}
 
@@ -19,10 +18,6 @@ def other_pictures(count=COUNT, size=(WIDTH, HEIGHT)):
 
 def proxy_movie(path, count=COUNT, size=(WIDTH, HEIGHT), **options):
     return make_movie(path, "mpeg4", pictures=other_pictures(count, size), size=size, **options)
-
-
-def with_proxy(source, path, **given):
-    return opening.with_proxy(source, partial(open_source, path, **given))
 
 
 @pytest.fixture(scope="module")

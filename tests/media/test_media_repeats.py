@@ -1,16 +1,13 @@
 """Frames that repeat the one before: which ones are found, and that moments go evenly across them."""
 
-from fractions import Fraction
-from pathlib import Path
-
 import av
+import footage
 import numpy as np
 import pytest
 from test_media_flow import blocks, frame
 from test_media_steps import Film as Texture
 from test_media_steps import shift
 
-from shutter_addon.core.frames.frame_source import FrameSource
 from shutter_addon.media import MediaError, PrefetchSource, open_source
 from shutter_addon.media.cuts import ShotSource
 from shutter_addon.media.smooth import MOST, Repeats, SmoothSource, steps_for
@@ -34,20 +31,14 @@ def place(picture, ground=60):
     return (seen * np.arange(WIDTH)).sum() / seen.sum()
 
 
-class Film(FrameSource):
-    """A film of a disc that moves from picture to picture; frame k shows picture shown[k]. It notes what is read."""
-
-    transfer, alpha, options, fps, dtype = "srgb", "opaque", {}, Fraction(30), np.dtype(np.uint8)
-    path, width, height = Path("disc.mov"), WIDTH, HEIGHT
+class Film(footage.Film):
+    """A film of a disc that moves from picture to picture; frame k shows picture shown[k]."""
 
     def __init__(self, shown, picture=lambda number: disc(40 + SPEED * number), noise=0.0):
-        self.shown, self.picture, self.count, self.noise = shown, picture, len(shown), noise
-        self.asked, self.lost = [], None
+        self.shown, self.picture, self.noise = shown, picture, noise
+        super().__init__(self.frame, len(shown))
 
-    def read(self, index):
-        if index == self.lost:
-            raise MediaError(f"frame {index} is lost")
-        self.asked.append(index)
+    def frame(self, index):
         made = self.picture(self.shown[index])
         if self.noise:
             grain = np.random.default_rng(index).normal(0, self.noise, (HEIGHT, WIDTH, 1))
@@ -176,13 +167,13 @@ def test_across_a_cut_nothing_is_bridged(sky):
 
 def test_a_lost_frame_beside_is_no_fault():
     film = Film([0, 0, 1, 1, 2, 2, 3])
-    film.lost = 4
+    film.lost = {4}
     source = skipping(film)
     np.testing.assert_array_equal(source.read(3 * STEP), film.read(3))  # it cannot be told how it goes on
     assert not np.array_equal(source.read(STEP), film.read(1))
     with pytest.raises(MediaError, match="frame 4 is lost"):
         source.read(3 * STEP + 1)
-    film.lost = None
+    film.lost = set()
     assert not np.array_equal(source.read(3 * STEP), film.read(3))
 
 

@@ -3,15 +3,14 @@
 import gc
 import weakref
 from itertools import product
-from pathlib import Path
 from types import SimpleNamespace
 
+import footage
 import numpy as np
 import pytest
 from test_media_flow import blocks, frame, off, pan
 from test_media_steps import Film, shift
 
-from shutter_addon.core.frames.frame_source import FrameSource
 from shutter_addon.core.frames.planes import as_rgba
 from shutter_addon.core.model.shutters import MAX_WINDOW
 from shutter_addon.media import MediaError, PrefetchSource, opencv, smooth
@@ -20,22 +19,18 @@ from shutter_addon.media.smooth import SmoothSource, steps_for
 SPEED = 8  # pixels from a frame to the next
 
 
-class Panned(FrameSource):
-    """Pictures that move to the left, from a cut on other ones; it notes which were read, and which of them live."""
+class Panned(footage.Film):
+    """Pictures that move to the left, from a cut on other ones; it notes which of them live."""
 
-    transfer, alpha, options, fps = "srgb", "opaque", {"colour": "sRGB"}, 25
-    path = Path("pan.mov")
+    options = {"colour": "sRGB"}
 
     def __init__(self, count=8, cut=None, dtype=np.uint8):
-        self.count, self.cut, self.dtype, self.lost = count, cut, np.dtype(dtype), None
-        self.height, self.width, _ = pan(0).shape
-        self.asked, self._given, self.most = [], [], 0
+        self.cut, self._given, self.most = cut, [], 0
+        self.picture = lambda index: self.panned(index, dtype)
+        super().__init__(lambda index: self.picture(index), count)
 
     def read(self, index):
-        if index == self.lost:
-            raise MediaError(f"frame {index} is lost")
-        self.asked.append(index)
-        made = self.picture(index)
+        made = super().read(index)
         self._given.append(weakref.ref(made))
         self.most = max(self.most, self.living)
         return made
@@ -44,10 +39,10 @@ class Panned(FrameSource):
     def living(self):
         return sum(each() is not None for each in self._given)
 
-    def picture(self, index):
+    def panned(self, index, dtype):
         if self.cut is not None and index >= self.cut:
-            return frame(np.roll(blocks(5), -SPEED * index, axis=1), self.dtype)
-        return pan(SPEED * index, self.dtype)
+            return frame(np.roll(blocks(5), -SPEED * index, axis=1), dtype)
+        return pan(SPEED * index, dtype)
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float16])
@@ -105,19 +100,19 @@ def test_memory_has_a_bound_and_film_is_decoded_once():
 
 def test_a_lost_frame_is_one_sentence_until_it_is_back():
     film = Panned()
-    film.lost = 3
+    film.lost = {3}
     source = SmoothSource(film, 4)
     for moment in (9, 12, 14):
         with pytest.raises(MediaError, match="frame 3 is lost"):
             source.read(moment)
     assert off(source.read(6), pan(12)) < 1
-    film.lost = None
+    film.lost = set()
     assert off(source.read(14), pan(28)) < 1
 
 
 def test_its_ends():
     for index in (-1, 29):
-        with pytest.raises(IndexError, match=r"pan\.mov: it has frames 0 to 28"):
+        with pytest.raises(IndexError, match=r"film\.mov: it has frames 0 to 28"):
             SmoothSource(Panned(), 4).read(index)
     source = SmoothSource(Panned(1), 16)
     assert source.count == 1

@@ -15,6 +15,7 @@ from footage import save_image
 from test_carrying import HEIGHT, WIDTH, Footage, drawings
 
 from shutter_addon.media import MediaError, carried_mattes, derived
+from shutter_addon.media.subject_mattes import CarriedFile
 
 if os.name != "posix":
     pytest.skip("pipes, sockets and devices by name, alarms: of POSIX systems only", allow_module_level=True)
@@ -36,15 +37,11 @@ def in_time():
     signal.signal(signal.SIGALRM, handler)
 
 
-@pytest.fixture(autouse=True)
-def _nowhere_else(monkeypatch):
-    """Where mattes are kept in place of a folder is each test's own."""
-    monkeypatch.setattr(carried_mattes, "_elsewhere", {})  # which lasts as long as the program
-
-
 def read(folder):
     """The matte, as a program that begins anew reads it."""
-    return carried_mattes.CarriedFile(Footage(folder), drawings(0, 2), folder / "mattes").open().read(FRAME)
+    carried_mattes._writable.cache_clear()  # private: it lasts as long as the program
+    carried_mattes._temporary.cache_clear()  # private: as before
+    return CarriedFile(Footage(folder), drawings(0, 2), folder / "mattes").open().read(FRAME)
 
 
 @pytest.fixture(scope="module")

@@ -2,17 +2,10 @@
 
 import numpy as np
 
-from shutter_addon.core.frames.frame_source import FrameSource, SourceWrapper
+from shutter_addon.core.frames.frame_source import FrameSource
 from shutter_addon.media import PrefetchSource, open_source
 from shutter_addon.media.cuts import ShotSource
 from shutter_addon.media.smooth import SmoothSource
-
-MEMBERS = {name for name in {*FrameSource.__annotations__, *vars(FrameSource)} if not name.startswith("_")}
-
-
-def test_a_wrapper_forwards_every_member():
-    assert {"path", "files", "shots", "read", "want", "close"} <= MEMBERS
-    assert vars(SourceWrapper).keys() >= MEMBERS
 
 
 def test_through_all_wrappers(bunny):

@@ -16,7 +16,7 @@ from footage import cut_file, damage_frame, make_movie, movies_that_cannot_be_op
 
 from shutter_addon.media import MediaError, blender_movie, files, open_source
 from shutter_addon.media.blender_movie import BlenderMovie, frame_rate
-from shutter_addon.media.opening import movie_channel, open_channel
+from shutter_addon.media.opening import MatteFile, movie_channel
 
 ROOT = Path(__file__).parents[2]
 SCRIPT = ROOT / "shutter_addon" / "blender" / "data" / "decoding_process.py"
@@ -160,14 +160,12 @@ def test_channels_are_those_that_pyav_decodes(coloured):
     for name in ("bt709.mp4", "alpha_png.mov", "ten_bits.mp4", "gray.mkv"):
         for channel in ("luminance", "red", "green", "blue", "alpha"):
             with (
-                open_channel(coloured[name], channel) as theirs,
+                movie_channel(open_source(coloured[name]), channel) as theirs,
                 movie_channel(BlenderMovie(coloured[name]), channel) as ours,
             ):
                 one, other = ours.read(1), theirs.read(1)  # PyAV's luminance of grey pictures is their luma
                 assert one.shape == other.shape or (name, channel) == ("gray.mkv", "luminance")
                 assert not one.size or np.abs(one.astype(int) - other).max() == 0
-    with pytest.raises(MediaError, match=r"^gray\.mkv: has no channel depth, but luminance"):
-        open_channel(coloured["gray.mkv"], "depth")
 
 
 @pytest.mark.usefixtures("_no_pyav")
@@ -176,11 +174,11 @@ def test_without_pyav_movies_are_opened_so(coloured):
         assert (source.by_blender, source.width, source.height) == (True, 64, 32)
         assert source.read(0).shape == (32, 64, 4)
         assert source.file_kind == "a movie, read by a second Blender"
-    with open_channel(coloured["bt709.mp4"], "red") as channel:
-        assert channel.read(0).shape == (64, 128, 1)
+    with MatteFile(coloured["bt709.mp4"], "red").open() as channel:
+        assert channel.read(0).shape == (64, 128)
     for opened in (
         lambda **which: open_source(coloured["bt709.mp4"], **which),
-        lambda **which: open_channel(coloured["bt709.mp4"], "red", **which),
+        lambda **which: MatteFile(coloured["bt709.mp4"], "red", **which).open(),
     ):
         with pytest.raises(MediaError, match=r"^bt709\.mp4: movies need the Python package PyAV"):
             opened(stream=1)
@@ -203,15 +201,13 @@ def test_memory_stays_bounded_and_a_blender_that_was_killed_is_followed_by_anoth
 
 
 def test_an_answer_that_nobody_waited_for_is_not_the_next_one(movies, monkeypatch):
-    class Interrupted:
-        def result(self, _timeout):
-            raise KeyboardInterrupt
+    def interrupted(_stream):
+        raise KeyboardInterrupt
 
     path, numbers = movies["b_frames.mp4"]
-    start = blender_movie.threads.start
     with BlenderMovie(path) as source:
         assert number(source.read(1)) == numbers[1]
-        monkeypatch.setattr(blender_movie.threads, "start", lambda *given: (start(*given), Interrupted())[1])
+        monkeypatch.setattr(blender_movie, "_line", interrupted)  # private: an interrupt comes while it waits
         with pytest.raises(KeyboardInterrupt):
             source.read(3)
         monkeypatch.undo()
@@ -221,9 +217,12 @@ def test_an_answer_that_nobody_waited_for_is_not_the_next_one(movies, monkeypatc
 @pytest.mark.skipif(os.name != "posix", reason="processes are stopped by signals there alone")
 def test_a_blender_that_was_stopped_is_followed_by_another(movies, monkeypatch):
     with BlenderMovie(movies["open.mp4"][0]) as source, ThreadPoolExecutor(1) as pool:
-        before, stopped = source.read(3), process()
-        monkeypatch.setattr(blender_movie, "ANSWERING", 1)
-        monkeypatch.setattr(blender_movie, "ENDING", 0.1)
+        before, stopped, own = source.read(3), process(), blender_movie._killed_after  # private: others take a minute
+
+        def killed_soon(seconds, process):
+            return own(0.1 if process.pid == stopped else seconds, process)
+
+        monkeypatch.setattr(blender_movie, "_killed_after", killed_soon)  # private: as above
         os.kill(stopped, signal.SIGSTOP)
         try:
             again = pool.submit(source.read, 3).result(90)
@@ -250,11 +249,11 @@ SILENT = [sys.executable, "-c", "import time; time.sleep(600)"]
         (["/nowhere/blender"], "cannot be started: No such file or directory"),
         ([sys.executable, "-c", "pass"], "has ended"),
         ([sys.executable, "-c", "import sys; print(sys.argv[-1])"], "has ended"),
-        (SILENT, r"is not ready after 4 seconds"),
+        (SILENT, "has ended"),
     ],
 )
 def test_a_blender_that_does_not_answer_is_killed_and_one_sentence(coloured, monkeypatch, command, reason):
-    monkeypatch.setattr(blender_movie, "STARTING", 4)
+    monkeypatch.setattr(blender_movie, "ANSWERING", 1)
     monkeypatch.setattr(blender_movie, "ENDING", 0.1)
     blender_movie.lend(command)
     sentence = rf"^bt709\.mp4: cannot be read as a movie \(the Blender that decodes it {reason}\)$"

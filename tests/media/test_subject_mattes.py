@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from test_carrying import Footage
 
+from shutter_addon.core.messages import MediaError
 from shutter_addon.core.model import outlines
 from shutter_addon.media import subject_mattes
-from shutter_addon.media.errors import MediaError
 from shutter_addon.media.subject import MODEL, Network
-from shutter_addon.media.subject_mattes import Subject, SubjectFile
+from shutter_addon.media.subject_mattes import CarriedFile, Subject
 
 WIDTH, HEIGHT, COUNT = 240, 160, 5
 GROUND = cv2.resize(np.random.default_rng(1).integers(90, 130, (12, 40, 3), np.uint8), (2 * WIDTH, HEIGHT))
@@ -62,7 +62,7 @@ def iou(matte, mask):
 def opened(tmp_path):
     def made(strokes, nots=None, drawings=(), **what):
         footage = film(tmp_path, **what)
-        return SubjectFile(footage, Subject(strokes, nots or {}, 0.02), drawings, tmp_path / "mattes").open()
+        return CarriedFile(footage, drawings, tmp_path / "mattes", Subject(strokes, nots or {})).open()
 
     return made
 
@@ -133,6 +133,6 @@ def test_models_that_cannot_be_used(tmp_path):
     for path in (damaged, foreign):
         with pytest.raises(MediaError, match=f"{path.name}: is damaged, or no ONNX model that OpenCV can run"):
             Network(path)
-    with pytest.raises(MediaError, match="the model that finds subjects cannot be read"):
-        SubjectFile(film(tmp_path), Subject({}, {}, 0.02), model=tmp_path / "missing.onnx").open()
+    with pytest.raises(MediaError, match=r"^missing\.onnx: cannot be read \(No such file or directory\)$"):
+        CarriedFile(film(tmp_path), (), subject=Subject({}, {}), model=tmp_path / "missing.onnx").open()
     assert subject_mattes.MODEL == MODEL

@@ -3,11 +3,11 @@
 from pathlib import Path
 
 import cv2
+import footage
 import numpy as np
 import pytest
 
 from shutter_addon.core.frames import light
-from shutter_addon.core.frames.frame_source import FrameSource
 from shutter_addon.core.model import scribbles
 from shutter_addon.core.model.effect import Drawings, Moves, Region
 from shutter_addon.core.model.keyframes import Constant, Keys
@@ -38,21 +38,17 @@ def subject():
     return still("bigbuckbunny.mp4", 60)
 
 
-class Film(FrameSource):
+class Film(footage.Film):
     """Frames (n, H, W, 3) of arrays."""
 
-    transfer, alpha, options, fps, path = "srgb", "opaque", {}, None, Path("film")
-
     def __init__(self, frames):
-        self.frames, self.count, self.reads = frames, len(frames), []
-        self.height, self.width, _ = frames[0].shape
-        self.dtype = frames[0].dtype
+        self.frames = frames
+        super().__init__(self.frame, len(frames))
 
-    def read(self, index):
-        self.reads.append(index)
+    def frame(self, index):
         frame = self.frames[index]
-        white = np.iinfo(self.dtype).max if self.dtype.kind == "u" else 1
-        return np.dstack([frame, np.full(frame.shape[:2], white, self.dtype)])
+        white = np.iinfo(frame.dtype).max if frame.dtype.kind == "u" else 1
+        return np.dstack([frame, np.full(frame.shape[:2], white, frame.dtype)])
 
 
 def motion(x=0.0, y=0.0, degrees=0.0, scale=1.0):
@@ -332,7 +328,7 @@ def test_the_order_of_reading_and_threads_change_no_bit(subject, ground, tmp_pat
 def test_backward_a_source_is_read_upwards(subject, ground):
     source, _ = film(subject, ground, lambda t: (t,), 10, 9)
     followed(source, "line", 9)
-    assert source.reads == [9, *range(9)]
+    assert source.asked == [9, *range(9)]
 
 
 def test_deep_and_linear_pictures_look_alike(subject):
@@ -349,7 +345,7 @@ class CutOut(Film):
 
     alpha = "straight"
 
-    def read(self, index):
+    def frame(self, index):
         return self.frames[index]
 
 

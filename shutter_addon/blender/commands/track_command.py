@@ -19,7 +19,6 @@ from ...media.carried_mattes import CarriedMattes
 from ...media.cuts import ShotSource
 from ...media.footage import Footage
 from ...media.smooth import SmoothSource, steps_for
-from ...media.subject import WIDTH
 from ...media.subject_mattes import Subject, SubjectMattes
 from ..data import preferences
 from ..editing import whole_edits
@@ -142,9 +141,9 @@ def _cover(
     medium = ends.enter_context(command_line.open_footage(arguments.source))
     mattes: CarriedMattes
     if isinstance(region, SubjectRegion):
-        subject = Subject(strokes=curves(region.drawings), nots=curves(region.nots), width=WIDTH)
+        subject = Subject(strokes=curves(region.drawings), nots=curves(region.nots))
         drawn = tuple(sorted(curves(region.outlines).items()))
-        mattes = SubjectMattes(medium, subject, drawn, model=preferences.model())
+        mattes = SubjectMattes(medium, drawn, None, subject, preferences.model())
     else:
         mattes = CarriedMattes(medium, tuple(sorted(curves(region.drawings).items())))
     ends.enter_context(closing(mattes))

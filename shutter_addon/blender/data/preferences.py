@@ -7,7 +7,7 @@ from bpy.props import EnumProperty, IntProperty, StringProperty
 from bpy.types import Context
 
 from ...core.model.choices import CONTEXT
-from ...media.subject import model_path
+from ...media.subject import MODEL
 from . import strips
 
 ADDON = __package__.rpartition(".shutter_addon")[0] or "shutter_addon"
@@ -70,7 +70,8 @@ def gpu_memory() -> int:
 
 def model() -> Path:
     """The file of the model that finds subjects."""
-    return model_path(bpy.path.abspath(getattr(_preferences(), "model", "")))
+    chosen = getattr(_preferences(), "model", "")
+    return Path(bpy.path.abspath(chosen)).expanduser() if chosen else MODEL
 
 
 def _preferences() -> ShutterPreferences | None:

@@ -23,9 +23,7 @@ from ...core.model import following, keyframes, limits, mattes, outlines
 from ...core.model.fields import fields_of
 from ...core.model.frame_state import Options
 from ...core.recipes import baking
-from ...media.carried_mattes import CarriedFile
-from ...media.subject import WIDTH
-from ...media.subject_mattes import Subject, SubjectFile
+from ...media.subject_mattes import CarriedFile, Subject
 from . import matte_content, preferences, sampled, source_media, strips, validation
 from .annotations import LAYERS, image_to_picture, layer_of, layers_of, picture_size
 from .fcurves import curves_under, points_of, progress, stretched
@@ -191,7 +189,7 @@ def region_at(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, fra
 
 def carried_outline(
     scene: Scene, effect: PropertyGroup, strip: Strip, index: int, frames: Frames
-) -> tuple[CarriedFile | SubjectFile, dict[float, int]]:
+) -> tuple[CarriedFile, dict[float, int]]:
     """Return the file of a tracked outline's or a subject's mattes, and the filmed frames that timeline frames show.
 
     Raises:
@@ -328,7 +326,7 @@ def _any_region(sampling: Sampling, index: int, shutter: int) -> model.Region | 
     return kind(shutter=shutter, content=content, moves=moves, **drawn, **sampling.fields(region, path, kind))
 
 
-def _drawn(sampling: Sampling, index: int) -> tuple[dict[str, Any], CarriedFile | SubjectFile | None]:
+def _drawn(sampling: Sampling, index: int) -> tuple[dict[str, Any], CarriedFile | None]:
     """Return what is drawn in an outline or a subject, by the model's names, and the file of its tracked mattes.
 
     The mattes of a linear outline are not tracked, so that it has no file.
@@ -346,8 +344,8 @@ def _drawn(sampling: Sampling, index: int) -> tuple[dict[str, Any], CarriedFile 
     made: dict = matte_content.tracked(sampling) | {"drawings": tuple(sorted(curves.items()))}
     if not is_subject:
         return drawn, CarriedFile(**made)
-    subject = Subject(strokes=marks[0], nots=marks[1], width=WIDTH)
-    return drawn, SubjectFile(**made, subject=subject, model=preferences.model())
+    subject = Subject(strokes=marks[0], nots=marks[1])
+    return drawn, CarriedFile(**made, subject=subject, model=preferences.model())
 
 
 def _by_source_frame(sampling: Sampling, drawings: model.Drawings) -> dict[int, outlines.Curves]:

@@ -3,7 +3,6 @@
 import ctypes
 from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -119,7 +118,7 @@ class SourceSpec:
             files = [of_image(proxy.path, file) for file in self.files]
             # Blender has converted all but data to the sequencer's color space.
             how = {"files": files, "colorspace": "Non-Color" if how["colorspace"] == "Non-Color" else None}
-        return with_proxy(medium, partial(open_source, proxy.path, **how))
+        return with_proxy(medium, proxy.path, **how)
 
 
 def spec(strip: Strip) -> SourceSpec:

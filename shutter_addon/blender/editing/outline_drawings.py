@@ -15,9 +15,9 @@ from ...core.messages import EffectError
 from ...core.model import outlines, scribbles
 from ...core.model.masks import MaskShape
 from ...core.model.scribbles import mapped
-from ...media import flow, outlining
-from ...media.carried_mattes import CarriedFile, CarriedMattes
-from ...media.subject_mattes import SubjectFile
+from ...media import carrying, flow, outlining
+from ...media.carried_mattes import CarriedMattes
+from ...media.subject_mattes import CarriedFile
 from ..data import annotations, mask_reading, snapshot, strips
 from ..data.annotations import layer_of
 from ..rendering import effect_source
@@ -46,7 +46,7 @@ def curves_now(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) ->
 
 
 @lru_cache(1)  # opening a movie for each frame would be slow; reading opens it again
-def _opened(file: CarriedFile | SubjectFile) -> CarriedMattes:
+def _opened(file: CarriedFile) -> CarriedMattes:
     return file.open()
 
 
@@ -111,7 +111,7 @@ def outline_it(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) ->
     if not len(strokes):
         raise EffectError(rpt_("The region has no strokes at the current frame"))
     picture = picture_now(scene, effect, strip)
-    height, width = outlining.working_shape(picture)
+    width, height = carrying.working_size(*picture.shape[1::-1])
     encloses = region.kind != "LINE"
     shape = scribbles.Shape(shutter=0, kind="line", width=region.width, strokes=tuple(strokes))
     drawn = outlines.coverage(strokes, width, height) > 0.5 if encloses else np.zeros((height, width), bool)
@@ -129,9 +129,7 @@ def outline_it(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) ->
     return True
 
 
-def carried_frames(
-    scene: Scene, effect: PropertyGroup, strip: Strip, index: int
-) -> tuple[CarriedFile | SubjectFile, dict[int, int]]:
+def carried_frames(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> tuple[CarriedFile, dict[int, int]]:
     """Return the mattes of an outline or subject, and the source frame for each timeline frame of its strip.
 
     Raises:

@@ -16,7 +16,7 @@ from bpy.types import PropertyGroup, Scene, Strip
 
 from ...core.messages import EffectError
 from ...core.model.frame_state import Options
-from ...media import flow, readout
+from ...media import opencv, readout
 from ...media.cuts import ShotSource
 from ..data import snapshot, source_media, strips, validation
 from ..data.consistency import bars
@@ -87,7 +87,7 @@ def repair(scene: Scene, effect: PropertyGroup, strip: Strip, share: float, side
     known = of(effect)
     if known is None and (sentence := region_edits.why_full(effect, regions=1, shutters=2)):
         raise EffectError(sentence)
-    flow.check()
+    opencv.check("moments between frames need")
     effect.window = max(validation.number(effect, "window"), FRAMES)
     effect.position, effect.interpolation = "CENTER", "DISPLACEMENT"
     if effect.inbetween == "1":

@@ -11,8 +11,7 @@ from dataclasses import dataclass, field
 import bpy
 
 from ...core import stopping, threads
-from ...media.carried_mattes import CarriedFile
-from ...media.subject_mattes import SubjectFile
+from ...media.subject_mattes import CarriedFile
 from ..data import preview_areas
 from ..devices import main_thread
 from .effect_source import in_words
@@ -33,7 +32,7 @@ class _Carrying:
         soon: How many of the frames are drawn.
     """
 
-    file: CarriedFile | SubjectFile
+    file: CarriedFile
     frames: list[int]
     arrived: Callable[[], None]
     middle: int | None = None
@@ -67,15 +66,15 @@ class _Mattes:
         carrying: Those that are made.
     """
 
-    wanted: dict[CarriedFile | SubjectFile, set[int]] = field(default_factory=dict)
-    failed: dict[CarriedFile | SubjectFile, str] = field(default_factory=dict)
+    wanted: dict[CarriedFile, set[int]] = field(default_factory=dict)
+    failed: dict[CarriedFile, str] = field(default_factory=dict)
     carrying: _Carrying | None = None
 
 
 _mattes = _Mattes()
 
 
-def want(file: CarriedFile | SubjectFile, frame: int) -> None:
+def want(file: CarriedFile, frame: int) -> None:
     """Note the source frame of a matte that a preview misses."""
     if file not in _mattes.failed:
         _mattes.wanted.setdefault(file, set()).add(frame)
@@ -100,9 +99,7 @@ def begin(arrived: Callable[[], None]) -> str | None:
     return next(iter(_mattes.failed.values()), None)
 
 
-def carry(
-    file: CarriedFile | SubjectFile, frames: list[int], arrived: Callable[[], None], middle: int | None = None
-) -> None:
+def carry(file: CarriedFile, frames: list[int], arrived: Callable[[], None], middle: int | None = None) -> None:
     """Make the mattes of source frames, from a middle outwards, in place of those being made.
 
     `arrived` is as in `begin`.
@@ -113,7 +110,7 @@ def carry(
     main_thread.later(_look, TICK)
 
 
-def failure(file: CarriedFile | SubjectFile) -> str | None:
+def failure(file: CarriedFile) -> str | None:
     """Return why the mattes of a file could not be made, or None."""
     return _mattes.failed.get(file)
 
