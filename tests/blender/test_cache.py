@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from support import effect_of, image_strip, recipe, remembering, request, write_frames
 
-from shutter_addon.blender import handlers
 from shutter_addon.blender.data import fcurves, source_media, strips
 from shutter_addon.blender.editing import reconcile
 from shutter_addon.blender.rendering import invalidation, session
@@ -131,19 +130,6 @@ def test_undo_and_redo_are_rendered(bpy, edit, effect, render, change):
         assert np.array_equal(render(bpy.context.scene, [FRAME])[FRAME], before)
         bpy.ops.ed.redo()
         assert np.array_equal(render(bpy.context.scene, [FRAME])[FRAME], after)
-
-
-@pytest.mark.usefixtures("on_numpy")
-def test_the_cache_is_on(bpy, edit, effect, render):
-    """What the other tests rest on: without the handlers, a frame would be the old one."""
-    before = render(edit, [FRAME])[FRAME]
-    handlers.unregister()
-    try:
-        CHANGES["change_value"](edit)
-        assert np.array_equal(render(edit, [FRAME])[FRAME], before)
-    finally:
-        handlers.register()
-    assert not np.array_equal(render(edit, [FRAME])[FRAME], before)
 
 
 def test_what_is_known_of_effects_goes_with_them(edit, effect):

@@ -52,19 +52,6 @@ def window(frame, bars):
     return np.minimum(places, (CUT - 1) * STEPS + STEPS // 2 if frame <= CUT else (COUNT - 1) * STEPS)
 
 
-def test_bars_stay_what_they_are(run, film, tmp_path, same_pixels):
-    """Beside the output nothing is written."""
-    first, frames = film
-    bars = [1, 0.5, 1]
-    run(first, "out", recipe(3, bars, inbetween=STEPS), "--frames", "2:3")
-    for frame in (2, 3):
-        expected = shown(frames, window(frame, bars), spread(bars, STEPS))
-        same_pixels(read_picture(tmp_path / "out" / f"{frame:04d}.png"), expected, 1)
-    assert {path.name for path in tmp_path.iterdir()} == {"out", "recipe.json"}
-    run(first, "off", recipe(3, bars), "--frames", 2)
-    same_pixels(read_picture(tmp_path / "off" / "0002.png"), shown(frames, (4, 8, 12), bars), 1)
-
-
 def test_chunks_are_the_whole(run, film, tmp_path):
     """Bit for bit; the window stops in the middle of the cut's pair."""
     first, frames = film

@@ -8,7 +8,6 @@ from support import (
     effect_of,
     image_strip,
     noise_film,
-    picture_of,
     recipe,
     request,
     sequencer,
@@ -18,7 +17,6 @@ from support import (
 
 from shutter_addon.blender.data import strips
 from shutter_addon.blender.editing import add_effect, shutter_edits
-from shutter_addon.blender.rendering import effect_source
 from shutter_addon.blender.rendering import job_snapshots as snapshots
 from shutter_addon.core.frames import light
 
@@ -77,14 +75,6 @@ def check(edit, render, effect_strips, frames):
     for frame, picture in shown.items():
         assert np.abs(picture - plain[frame]).max() <= LEVELS, f"at frame {frame}"
     assert len({p[0, 0, 0] for p in plain.values()}) > len(frames) / 20, "the plain strip shows several frames"
-
-
-def test_before_frame_one_and_trimmed_after_the_effect_was_made(edit, render, effect_on, movie):
-    source = new_movie(edit, movie, start=-20)
-    strip, _ = effect_on(source)
-    source.left_handle, source.right_handle = -15, 30
-    strip.left_handle, strip.right_handle = -18, 35
-    check(edit, render, [strip], range(-15, 30, 4))
 
 
 def test_still_frames_beyond_the_content(edit, render, effect_on, movie):
@@ -156,14 +146,6 @@ def test_a_freeze_frame(edit, render, effect_on, movie, retime):
     check(edit, render, [strip], range(1, source.right_handle))
 
 
-def test_half_of_a_retimed_strip_that_was_cut_hard(edit, render, effect_on, movie, retime):
-    new_movie(edit, movie)
-    source = new_movie(edit, movie, 81)
-    retime("segment_speed_set", source, speed=150.0)
-    right = source.split(101, "HARD")
-    check(edit, render, [effect_on(strip)[0] for strip in (source, right)], range(81, right.right_handle, 3))
-
-
 @pytest.mark.parametrize("fps", [24, 25, 30])
 def test_a_movie_of_240_fps_that_keeps_its_speed(bpy, edit, render, effect_on, tmp_path, fps):
     """As the Add menu adds it, with "Adjust Playback Rate"."""
@@ -221,20 +203,6 @@ def test_the_window_reaches_past_a_trim(edit, render, effect_on, images):
     assert render(edit, [5])[5][0, 0, 0] == pytest.approx(12 * 11 + 5, abs=1)
 
 
-def test_cut_effect_and_source(edit, render, effect_on, movie):
-    source = new_movie(edit, movie)
-    data = recipe(4, {1: [1, 0, 0, 0], 31: [0, 0, 0, 1]})
-    strip, _ = effect_on(source, data)
-    frames = [1, 9, 19, 20, 21, 22, 30, 50]
-    whole = render(edit, frames)
-    parts = [strip, strip.split(20, "SOFT")]
-    parts.append(parts[1].split(30, "HARD"))
-    source.split(22, "SOFT")
-    assert len({part.scene for part in parts}) == 1
-    for frame, picture in render(edit, frames).items():
-        assert np.array_equal(picture, whole[frame]), frame
-
-
 def test_a_duplicate_keeps_the_look_and_gets_data_of_its_own(bpy, edit, render, effect_on, movie):
     source = new_movie(edit, movie)
     strip, _ = effect_on(source, recipe(4, {1: [1, 0, 0, 0], 31: [0, 0, 0, 1]}, regions=[]))
@@ -257,17 +225,6 @@ def test_a_duplicate_keeps_the_look_and_gets_data_of_its_own(bpy, edit, render, 
         assert np.array_equal(shown[frame + 100], before[frame])
     effects[1].shutters[0].name = "Other"
     assert effects[0].shutters[0].name == "S0"
-
-
-def test_an_effect_moved_with_its_source_takes_its_keys_along(edit, render, effect_on, movie):
-    source = new_movie(edit, movie)
-    strip, _ = effect_on(source, recipe(4, {1: [1, 0, 0, 0], 31: [0, 0, 0, 1]}))
-    before = render(edit, [1, 11, 31])
-    for s in (strip, source):
-        s.content_start += 40
-    after = render(edit, [41, 51, 71])
-    for frame in (1, 11, 31):
-        assert np.array_equal(after[frame + 40], before[frame])
 
 
 @pytest.mark.parametrize("flips", [(True, False), (False, True)])
@@ -323,20 +280,6 @@ def test_half_resolution(edit, render, effect_on, movie):
     strip, _ = effect_on(new_movie(edit, movie))
     edit.render.resolution_percentage = 50
     check(edit, render, [strip], [1, 20, 40, 60])
-
-
-def test_what_cannot_be_shown_is_said(bpy, edit, effect_on, movie):
-    source = new_movie(edit, movie)
-    _, effect = effect_on(source)
-    effect.shutters[0].bars[0].weight = 0
-    with pytest.raises(effect_source.FAULTS, match='shutter "S0" at frame 5: all bars are zero'):
-        picture_of(effect.scene, 5)
-    effect.shutters.clear()
-    with pytest.raises(effect_source.FAULTS, match='"Shutter" has no shutter'):
-        picture_of(effect.scene, 5)
-    edit.sequence_editor.strips.remove(source)
-    with pytest.raises(effect_source.FAULTS, match='the source strip of "Shutter" was deleted'):
-        picture_of(effect.scene, 5)
 
 
 def test_a_hard_cut_changes_no_picture(bpy, edit, render, tmp_path):
