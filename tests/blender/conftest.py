@@ -118,6 +118,18 @@ def render_words(tmp_path):
 
 
 @pytest.fixture
+def run(bpy, capfd):
+    """Runs a command in this process: its exit code, and what it says on stderr."""
+    from shutter_addon.blender.command import main
+
+    def told(*words):
+        capfd.readouterr()
+        return main([str(word) for word in words]), capfd.readouterr().err
+
+    return told
+
+
+@pytest.fixture
 def command(render_words):
     """Runs `python -m shutter_addon render` in a process of its own."""
 

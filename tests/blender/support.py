@@ -4,6 +4,7 @@ import dataclasses
 import json
 import subprocess
 import sys
+import wave
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -39,18 +40,49 @@ def write_frames(folder, frames, name="f"):
     return folder / f"{name}0001.png"
 
 
-def write_movie(path, frames, codec="ffv1", pixels="bgr0", rate=24, options=None):
-    """Frames (n, H, W, 3) uint8 as a movie; its path."""
+def write_movie(path, frames, codec="ffv1", pixels="bgr0", rate=24, options=None, tone=None):
+    """Frames (n, H, W, 3) uint8 as a movie, with a tone of 16-bit samples at 48 kHz if there is one; its path."""
     import av  # which a Blender that runs the other functions may lack
 
     with av.open(str(path), "w") as container:
         stream = container.add_stream(codec, rate=rate, options=options)
         stream.height, stream.width = frames[0].shape[:2]
         stream.pix_fmt = pixels
+        heard = container.add_stream("pcm_s16le", rate=48000, layout="mono") if tone is not None else None
         for frame in frames:
             container.mux(stream.encode(av.VideoFrame.from_ndarray(frame, format="rgb24")))
         container.mux(stream.encode())
+        if heard:
+            sound = av.AudioFrame.from_ndarray(np.asarray(tone, np.int16)[None], format="s16", layout="mono")
+            sound.sample_rate, sound.pts = 48000, 0
+            container.mux([*heard.encode(sound), *heard.encode()])
     return path
+
+
+def write_tone(path, samples=(0,) * 4800):
+    """A sound of these 16-bit samples at 48 kHz."""
+    with wave.open(str(path), "wb") as file:
+        file.setparams((1, 2, 48000, 0, "NONE", ""))
+        file.writeframes(np.asarray(samples, "<i2").tobytes())
+
+
+def refused(done, *words):
+    """Asserts that a command ended with code 2 and one sentence with these words. It is exit code and stderr, or a
+    process that has ended."""
+    code, said = done if isinstance(done, tuple) else (done.returncode, done.stderr)
+    lines = [line for line in said.strip().splitlines() if not line.startswith("libpng error")]
+    assert (code, len(lines)) == (2, 1), said
+    assert lines[0].startswith("Virtual Shutter: ")
+    assert len(lines[0]) <= 300
+    for word in words:
+        assert word.lower() in lines[0].lower()  # the system says "No space left", we say "no space left"
+
+
+def flip_bit(path):
+    """Changes one bit in the midst of a file."""
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 4
+    path.write_bytes(content)
 
 
 def recipe(window, *shutters, regions=(), **options):

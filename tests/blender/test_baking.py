@@ -1,8 +1,6 @@
 """Baking: an effect as files that an ordinary strip shows, and the effect again."""
 
 import os
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -215,22 +213,6 @@ def test_what_cannot_be_baked_is_one_sentence(film, tmp_path, shutter):
         assert code == 2
         assert sentence in errors
         assert len(errors.splitlines()) == 1
-
-
-@pytest.mark.usefixtures("on_numpy")
-def test_it_plays_without_the_extension(bpy, film, tmp_path):
-    scene, _effect, _strip = film()
-    bake(bpy)
-    before = rendered(bpy, scene, tmp_path / "with", (4,))
-    scene.frame_set(4)
-    scene.render.filepath = str(tmp_path / "without")
-    bpy.ops.wm.save_mainfile()
-    script = (
-        f"import bpy; bpy.ops.wm.open_mainfile(filepath={str(tmp_path / 'edit.blend')!r});"
-        " assert not hasattr(bpy.types.Scene, 'virtual_shutter'); bpy.ops.render.render(write_still=True)"
-    )
-    subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, cwd=tmp_path)
-    assert (read_picture(tmp_path / "without.exr") == before[0]).all()
 
 
 @pytest.mark.usefixtures("on_numpy")

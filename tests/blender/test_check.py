@@ -6,12 +6,11 @@ import os
 import shutil
 import subprocess
 import sys
-import wave
 from pathlib import Path
 
 import numpy as np
 import pytest
-from support import noise_film, recipe, write_frames, write_movie
+from support import noise_film, recipe, write_frames, write_movie, write_tone
 
 from shutter_addon.blender import command
 from shutter_addon.blender.data import recipe_import, versions
@@ -62,22 +61,13 @@ def test_a_sound_edit(noise, check, tmp_path):
     code, sentences, lines = check("--output", tmp_path / "out", "--frames", "2-3", "--device", "cpu")
     assert (code, sentences) == (0, [])
     edit = tmp_path / "edit.blend"
-    key = key_of(lines)
+    key = lines[0].split()[-1]
     assert lines == [f"Edit: {edit}, version {key}", "Frames: 2 to 3, 64×48", "Device: NumPy"]
     version = versions.of_edit(now()[0])
     assert version.key == key
     assert (tmp_path / "out" / job_file.NAME).exists()
     job_file.guard(tmp_path / "out", version)
-
-
-def key_of(lines):
-    return lines[0].split()[-1]
-
-
-def test_the_key_is_what_pictures_carry(noise, check, tmp_path):
-    key = key_of(check()[2])
-    options = ["--output", str(tmp_path / "out"), "--frames", "2"]
-    assert command.main(["render", str(tmp_path / "edit.blend"), *options]) == 0
+    assert command.main(["render", str(edit), "--output", str(tmp_path / "out"), "--frames", "2"]) == 0
     assert read(tmp_path / "out" / "0002.png").edit == key
 
 
@@ -178,15 +168,6 @@ def test_outlines(noise, check, tmp_path, monkeypatch):
     assert f"{FRAMES} mattes of outlines are not tracked yet" in " ".join(lines)
 
 
-def test_a_smooth_effect(noise, check):
-    """It needs nothing that is not there."""
-    plain = check()[2]
-    now()[1].inbetween = "8"
-    code, sentences, lines = check()
-    assert (code, sentences) == (0, [])
-    assert key_of(lines) != key_of(plain)
-
-
 def test_a_frame_that_a_moment_needs_is_missing(noise, check, tmp_path):
     """The second of its pair, which no bar is open for by itself: time stands between the two."""
     _edit, effect, _strip = now()
@@ -204,9 +185,7 @@ def test_a_frame_that_a_moment_needs_is_missing(noise, check, tmp_path):
 def test_plain_strips(noise, check, tmp_path):
     edit = now()[0]
     editor = edit.sequence_editor
-    with wave.open(str(tmp_path / "tone.wav"), "wb") as file:
-        file.setparams((1, 2, 48000, 0, "NONE", ""))
-        file.writeframes(bytes(9600))
+    write_tone(tmp_path / "tone.wav")
     _movie(tmp_path / "plain.mp4", 9)
     write_frames(tmp_path / "plain", np.zeros((3, 8, 8, 3), np.uint8))
     editor.strips.new_sound("sound", str(tmp_path / "tone.wav"), 5, 1)
@@ -285,7 +264,6 @@ def test_an_edit_that_cannot_be_resumed(noise, check):
     [
         (lambda edit: None, "film.mp4", ""),
         (lambda edit: None, "film", "film: none of .mp4"),
-        (lambda edit: None, "edit.blend", "edit.blend: none of .mp4"),
         (lambda edit: None, "in/f0001.png/film.mp4", "f0001.png: is a file, not a folder"),
         (lambda edit: None, "folder.mp4", "folder.mp4: is a folder, not a movie"),
         (
@@ -302,21 +280,6 @@ def test_a_movie_that_join_refuses(noise, check, tmp_path, change, name, sentenc
     assert [sentence in fault for fault in found] == [True] * bool(sentence)
     assert (tmp_path / "out").exists() == (not sentence)
     assert not list(tmp_path.glob("film*"))
-
-
-@pytest.mark.parametrize(
-    ("arguments", "sentence"),
-    [
-        (["none.blend"], "none.blend: no such file"),
-        (["."], ": is no file"),
-        (["edit.blend", "--frames=-1"], '--frames: "-1" is not A:B'),
-        (["edit.blend", "--frames", "3:99"], "--frames: 3:99 is not within the edit's frames 1:8"),
-    ],
-)
-def test_what_cannot_be_checked(noise, check, tmp_path, capsys, arguments, sentence):
-    check()
-    assert command.main(["check", str(tmp_path / arguments[0]), *arguments[1:]]) == 2
-    assert sentence in capsys.readouterr().err
 
 
 def test_nobody_reads_the_report(bpy, noise, tmp_path):

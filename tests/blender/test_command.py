@@ -1,10 +1,9 @@
 """The command, end to end: from footage and a recipe to files, through Blender's sequencer."""
 
-import av
 import numpy as np
 import OpenImageIO
 import pytest
-from support import read_picture, recipe, write_frames
+from support import read_picture, recipe, write_frames, write_movie
 
 from shutter_addon.blender.commands import command_line
 from shutter_addon.core.frames import light
@@ -108,21 +107,10 @@ def test_exr_is_scene_linear(command_here, noise, tmp_path):
 @pytest.fixture(scope="module")
 def with_sound(tmp_path_factory):
     """Ten frames of 160×90 that become brighter, at 25 a second, with a tone."""
+    ramp = np.add.outer(np.arange(90), np.arange(160)) // 2
+    pictures = np.stack([np.repeat((ramp + 12 * index)[..., None], 3, -1) for index in range(10)]).astype(np.uint8)
     path = tmp_path_factory.mktemp("sound") / "film.mkv"
-    with av.open(str(path), "w") as container:
-        video, audio = container.add_stream("ffv1", rate=25), container.add_stream("pcm_s16le", rate=48000)
-        audio.layout = "mono"
-        video.width, video.height, video.pix_fmt = 160, 90, "bgr0"
-        for index in range(10):
-            y, x = np.indices((90, 160))
-            picture = np.repeat(((x + y) // 2 + 12 * index)[..., None], 3, axis=-1).astype(np.uint8)
-            container.mux(video.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
-        tone = (8000 * np.sin(np.arange(19200) * 0.05)).astype(np.int16)[None]
-        sound = av.AudioFrame.from_ndarray(tone, format="s16", layout="mono")
-        sound.sample_rate, sound.pts = 48000, 0
-        for stream, frame in ((audio, sound), (audio, None), (video, None)):
-            container.mux(stream.encode(frame))
-    return path
+    return write_movie(path, pictures, rate=25, tone=8000 * np.sin(np.arange(19200) * 0.05))
 
 
 @pytest.mark.parametrize("ending", [".mp4", ".mov", ".mkv", ".webm", ".avi"])

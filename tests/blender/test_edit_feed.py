@@ -1,7 +1,9 @@
 """An edit that Blender renders by itself has the bits that the engine's pictures give it, whatever else is in it."""
 
+import os
 import shutil
 import tempfile
+from pathlib import Path
 
 import numpy as np
 import OpenImageIO
@@ -67,8 +69,9 @@ def compared(bpy, edit, tmp_path, monkeypatch):
             expected = pictures(bpy, edit, tmp_path / "engine")
         edit.sequence_editor.use_cache_raw = edit.sequence_editor.use_cache_final = True
         before = look(edit)
-        monkeypatch.setattr(LevelsFile, "write", note)
-        found = pictures(bpy, edit, tmp_path / "fed")
+        with monkeypatch.context() as patch:
+            patch.setattr(LevelsFile, "write", note)
+            found = pictures(bpy, edit, tmp_path / "fed")
         assert np.array_equal(found, expected)
         assert len({picture.tobytes() for picture in found}) == edit.frame_end
         assert look(edit) == before
@@ -273,6 +276,49 @@ def test_the_edit_is_put_back(bpy, edit, made, tmp_path, how):
         scene = bpy.context.scene
         assert [strip[:5] for strip in look(scene)[0]] == [strip[:5] for strip in before[0]]
         assert look(scene)[1:3] == before[1:3]
+
+
+def test_a_file_that_is_gone_leaves_the_film_to_the_engine(bpy, edit, made, compared, tmp_path):
+    """Blender would show it as a picture of one colour. What a killed render has left is removed, too."""
+    made()
+    left = tmp_path / "temporary" / f".part-{0:016x}"
+    left.mkdir()
+    os.utime(left, (0, 0))
+
+    def lose(edit, *_):
+        if edit.frame_current == 4:
+            for folder in (tmp_path / "temporary").glob(".part-*"):
+                shutil.rmtree(folder)
+
+    bpy.app.handlers.render_post.append(lose)
+    try:
+        assert compared() == [2, 3, 4, 5]  # the last one in vain
+    finally:
+        bpy.app.handlers.render_post.remove(lose)
+
+
+def test_a_studios_colour_configuration_leaves_the_film_to_the_engine(bpy, edit, made, compared, tmp_path, monkeypatch):
+    """A Blender with a window sets its own file."""
+    made()
+    own = Path(bpy.utils.system_resource("DATAFILES", path="colormanagement"), "config.ocio")
+    studio = tmp_path / "config.ocio"
+    studio.write_text(f"# of a studio\n{own.read_text()}")
+    for given, fed in ((own, ALL), (studio, [])):
+        monkeypatch.setenv("OCIO", str(given))
+        assert compared() == fed
+
+
+@pytest.mark.parametrize(("width", "height"), [(7, 5), (16, 64), (40, 65)])
+def test_a_file_whose_pixels_are_replaced(tmp_path, width, height):
+    levels = np.random.default_rng(0).integers(0, 256, (2, height, width, 4), dtype=np.uint8)
+    levels[..., 3] = 255
+    file = LevelsFile(tmp_path / "levels.tif", width, height)
+    spec = OpenImageIO.ImageBuf(str(file.path)).spec()
+    assert (spec.tile_width % 16, spec.tile_height) == (0, 64)
+    for shown in levels:
+        file.write(shown)
+        assert np.array_equal(OpenImageIO.ImageBuf(str(file.path)).get_pixels("uint8"), shown)
+    file.close()
 
 
 def test_what_cannot_be_written_is_left_to_the_engine(edit, made, compared, monkeypatch):

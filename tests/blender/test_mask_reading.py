@@ -167,24 +167,6 @@ def test_shape_keys_and_keyed_opacity(bpy, mask, assert_as_the_strip, mask_edito
     assert len({picture.tobytes() for picture in shown.values()}) == len(FRAMES)
 
 
-def test_a_linked_mask(bpy, mask, assert_as_the_strip, mask_editor, clip, edit, tmp_path):
-    layer = mask.layers.new(name="L")
-    spline = draw(layer, blob(random.Random(2), 5), 0.05)
-    with mask_editor(clip(40, 30), mask):
-        for frame in (5, 30):
-            edit.frame_set(frame)
-            for point in spline.points:
-                point.select = True
-                point.co = (point.co[0] + 0.1, point.co[1])
-            bpy.ops.mask.shape_key_insert()
-    bpy.data.libraries.write(str(tmp_path / "masks.blend"), {mask})
-    bpy.data.masks.remove(mask)
-    with bpy.data.libraries.load(str(tmp_path / "masks.blend"), link=True) as (_there, here):
-        here.masks = ["M"]
-    assert here.masks[0].library
-    assert_as_the_strip(here.masks[0], FRAMES)
-
-
 @pytest.fixture
 def moving(bpy, edit, mask, mask_editor, clip):
     """The mask, with a spline that has shape keys at frames 5 and 30, at frame 30."""

@@ -8,12 +8,11 @@ from pathlib import Path
 
 import pytest
 import stored
-from support import picture_of, sequencer
+from support import sequencer
 
 from shutter_addon.blender import command
 from shutter_addon.blender.data import data_format, preferences, property_copy
 from shutter_addon.blender.editing import reconcile, undelete
-from shutter_addon.core.messages import EffectError
 from shutter_addon.core.recipes import recipe_file
 
 ROOT = Path(__file__).parents[2]
@@ -67,16 +66,6 @@ def test_nothing_of_it_is_lost_by_saving(bpy, newer, made):
     assert after["saved by"]["Edit"] == [data_format.FORMAT + 1, "9.0.0"]
 
 
-def test_what_is_changed_is_saved(bpy, newer):
-    path, edit = newer
-    edit.virtual_shutter.effects[0].window = 5
-    edit.virtual_shutter.effects[0].position = "END"
-    bpy.ops.wm.save_mainfile()
-    bpy.ops.wm.open_mainfile(filepath=str(path))
-    effect = bpy.data.scenes["Edit"].virtual_shutter.effects[0]
-    assert (effect.window, effect.position, effect.bl_system_properties_get()["glow"]) == (5, "END", 0.75)
-
-
 def test_a_copy_has_what_nobody_knows(newer):
     effects = newer[1].virtual_shutter.effects
     effects.add()
@@ -87,16 +76,6 @@ def test_a_copy_has_what_nobody_knows(newer):
     halo, glows = (effects[-1].shutters[0].bl_system_properties_get()[name] for name in ("halo", "glows"))
     assert halo["strength"] == 3
     assert [glow["strength"] for glow in glows] == [4]
-
-
-def test_an_effect_that_needs_what_nobody_knows_is_refused_by_a_sentence(newer):
-    effect = newer[1].virtual_shutter.effects[0]
-    with pytest.raises(EffectError, match=r'^effect "Shutter": Position is none of its choices$'):
-        picture_of(effect.scene, 3)
-    effect.position = "START"
-    effect.regions[0].bl_system_properties_get(do_create=True)["kind"] = 99
-    with pytest.raises(EffectError, match=r'^region "walker": Type is none of its choices$'):
-        picture_of(effect.scene, 3)
 
 
 def test_a_recipe_of_it_says_what_it_lacks(bpy, newer, tmp_path, capfd):

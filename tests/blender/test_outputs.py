@@ -10,9 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support import read_picture, recipe, write_frames
+from support import read_picture, recipe, refused, write_frames
 
-from shutter_addon.blender import command
 from shutter_addon.blender.editing import whole_edits
 from shutter_addon.core import atomic_write
 from shutter_addon.media import open_source
@@ -35,26 +34,11 @@ def movie(bunny, tmp_path):
 
 
 @pytest.fixture
-def render(bpy, tmp_path, capfd):
+def render(run, tmp_path):
     """Runs the command in this process, with a recipe of a still frame: its exit code, and what it says on stderr."""
     (tmp_path / "recipe.json").write_text(json.dumps(STILL))
 
-    def run(source, *arguments):
-        capfd.readouterr()
-        arguments = ["render", source, "--recipe", tmp_path / "recipe.json", *arguments]
-        return command.main([str(argument) for argument in arguments]), capfd.readouterr().err
-
-    return run
-
-
-def refused(done, *words):
-    code, said = done
-    assert code == 2, said
-    (line,) = said.strip().splitlines()
-    assert line.startswith("Virtual Shutter: ")
-    assert len(line) <= 300
-    for word in words:
-        assert word.lower() in line.lower()  # "No space left" is what the system says, "no space left" what we do
+    return lambda source, *words: run("render", source, "--recipe", tmp_path / "recipe.json", *words)
 
 
 def everything(folder):

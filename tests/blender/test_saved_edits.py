@@ -7,9 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support import noise_film, read_picture
+from support import flip_bit, noise_film, read_picture, refused
 
-from shutter_addon.blender import command
 from shutter_addon.blender.data import versions
 from shutter_addon.core.farm import job_file
 
@@ -49,35 +48,8 @@ def saved(bpy, edit, noise, save, tmp_path):
     return save()
 
 
-@pytest.fixture
-def run(bpy, capfd):
-    """Runs the command in this process: its exit code, and what it says on stderr."""
-
-    def main(*arguments):
-        capfd.readouterr()
-        return command.main([str(argument) for argument in arguments]), capfd.readouterr().err
-
-    return main
-
-
-def refused(done, *words):
-    code, said = done
-    assert code == 2
-    (line,) = said.strip().splitlines()
-    assert line.startswith("Virtual Shutter: ")
-    for word in words:
-        assert word in line
-
-
 def bits(folder, ending="png"):
     return {path.name: read_picture(path).tobytes() for path in sorted(folder.glob(f"*.{ending}"))}
-
-
-def flip(path):
-    """Changes one bit in the midst of a file."""
-    content = bytearray(path.read_bytes())
-    content[len(content) // 2] ^= 4
-    path.write_bytes(content)
 
 
 def places(folder):
@@ -119,7 +91,7 @@ def test_resume_renders_what_is_missing_damaged_or_of_another_version(bpy, saved
     assert run("render", tmp_path / "changed.blend", "--output", other, "--frames", "5")[0] == 0
     assert bits(other)["0005.png"] != whole["0005.png"]
     (out / "0002.png").unlink()
-    flip(out / "0003.png")
+    flip_bit(out / "0003.png")
     content = (out / "0003.png").read_bytes()
     (out / "0004.png").write_bytes(content[: len(content) // 2])
     shutil.copy(other / "0005.png", out / "0005.png")
@@ -144,7 +116,7 @@ def test_a_damaged_exr_is_rendered_again(bpy, saved, run, save, tmp_path, codec)
     out = "--output", tmp_path / "out", "--format", "exr", "--frames", "1:2"
     assert run("render", save(), *out)[0] == 0
     whole = bits(tmp_path / "out", "exr")
-    flip(tmp_path / "out" / "0002.exr")
+    flip_bit(tmp_path / "out" / "0002.exr")
     assert run("render", saved, *out, "--resume")[0] == 0
     assert bits(tmp_path / "out", "exr") == whole
 
@@ -210,17 +182,9 @@ def test_missing_media_are_those_of_the_frames(bpy, edit, run, save, tmp_path):
     assert sorted(os.listdir(tmp_path / "out")) == ["0003.png"]
 
 
-def test_an_edit_without_an_effect_renders(bpy, edit, run, save, tmp_path):
-    strip = edit.sequence_editor.strips.new_effect("grey", "COLOR", 1, 1, length=2)
-    strip.color = 0.5, 0.25, 0.125
-    edit.frame_start, edit.frame_end = 1, 2
-    edit.render.resolution_x, edit.render.resolution_y = 16, 8
-    assert run("render", save(), "--output", tmp_path / "out") == (0, "")
-    assert np.abs(read_picture(tmp_path / "out" / "0002.png")[0, 0, :3] - [127.5, 63.75, 31.875]).max() <= 0.5
-
-
 def test_what_cannot_be_done_is_one_sentence(bpy, saved, run, save, tmp_path):
     out = "--output", tmp_path / "out"
+    (tmp_path / "folder.blend").mkdir()
     for arguments, *words in [
         ((saved,), "--output"),
         ((saved, "--output", tmp_path / "film.mp4"), "film.mp4", "folder of pictures"),
@@ -229,6 +193,7 @@ def test_what_cannot_be_done_is_one_sentence(bpy, saved, run, save, tmp_path):
         ((saved, *out, "--frames", "3:15"), "3:15", "the edit's frames 1:14"),
         ((saved, *out, "--frames", "3:"), "3:"),
         ((tmp_path / "none.blend", *out), "none.blend", "no such file"),
+        ((tmp_path / "folder.blend", *out), "folder.blend", "is no file"),
         ((tmp_path / "in" / "f0001.png", *out), "--recipe"),
         ((tmp_path / "in" / "f0001.png", *out, "--recipe", tmp_path / "r.json", "--resume"), "--resume"),
     ]:

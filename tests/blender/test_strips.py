@@ -75,14 +75,6 @@ def check(edit, render, effect_strips, frames):
     assert len({p[0, 0, 0] for p in plain.values()}) > len(frames) / 20, "the plain strip shows several frames"
 
 
-def test_before_frame_one_and_trimmed_after_the_effect_was_made(edit, render, effect_on, movie):
-    source = new_movie(edit, movie, start=-20)
-    strip, _ = effect_on(source)
-    source.left_handle, source.right_handle = -15, 30
-    strip.left_handle, strip.right_handle = -18, 35
-    check(edit, render, [strip], range(-15, 30, 4))
-
-
 def test_still_frames_beyond_the_content(edit, render, effect_on, movie):
     source = new_movie(edit, movie, start=10)
     source.left_handle, source.right_handle = 1, 90

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from support import recipe, write_frames
 
-from shutter_addon.blender import command as program
 from shutter_addon.core.model import motions
 from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media import camera_tracking, pursuit, tracking
@@ -31,16 +30,15 @@ def film(tmp_path_factory):
 
 
 @pytest.fixture
-def track(bpy, tmp_path, capfd):
+def track(run, tmp_path):
     """Runs the command in this process: its exit code, and what it says on stderr."""
 
-    def run(source, *arguments, **given):
+    def tracked(source, *arguments, **given):
         (tmp_path / "recipe.json").write_text(json.dumps(given.pop("recipe", plain())))
-        arguments = ["track", source, "--recipe", tmp_path / "recipe.json", *arguments]
-        code = program.main([str(argument) for argument in arguments])
-        return code, capfd.readouterr().err.strip()
+        code, said = run("track", source, "--recipe", tmp_path / "recipe.json", *arguments)
+        return code, said.strip()
 
-    return run
+    return tracked
 
 
 def plain(**region):

@@ -266,18 +266,6 @@ def test_editors_can_mend_it(bpy, edit, effect):
     assert picture_of(scene, 4).shape == (24, 40, 4)
 
 
-def test_a_render_of_such_a_file_ends_with_the_sentence(bpy, edit, effect, tmp_path, capfd):
-    raw(effect, "window", 10**9)
-    raw(effect.regions[0], "scale", NAN)
-    edit.render.filepath = str(tmp_path / "out.png")
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "bad.blend"))
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "bad.blend"))
-    capfd.readouterr()
-    assert bpy.ops.render.render(write_still=True) == {"CANCELLED"}
-    assert capfd.readouterr().err.strip() == 'Virtual Shutter: effect "Shutter": Frames is 1e+09, not 1 to 256'
-    assert not (tmp_path / "out.png").exists()
-
-
 def test_operators_report_it(bpy, edit, effect):
     raw(effect, "window", -5)
     with sequencer(bpy):

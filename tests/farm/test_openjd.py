@@ -51,12 +51,3 @@ def test_the_job_gives_the_bits_of_one_process(run_job, job, single):
     done = run_job()
     assert done.returncode == 0, done.stdout + done.stderr
     job.check(single)
-
-
-def test_missing_footage_ends_the_job_before_anything_is_rendered(run_job, job):
-    (job.folder / "footage.mp4").unlink()
-    done = run_job()
-    assert done.returncode != 0
-    assert "footage.mp4: no such file" in done.stdout
-    assert not job.movie.exists()
-    assert not list(job.folder.rglob("*.png"))
