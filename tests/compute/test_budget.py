@@ -148,12 +148,12 @@ def test_smaller_ways_show_the_same(limited, options):
     assert np.array_equal(sent, resident)
 
 
-@pytest.mark.parametrize("kind", ["follows", "follows in floats", "mattes"])
-def test_what_follows_and_mattes_fit_too(limited, kind):
-    source, reader = film(**({"dtype": np.float16, "transfer": "linear"} if "floats" in kind else {})), None
+@pytest.mark.parametrize("what", ["follows", "follows in floats", "mattes"])
+def test_what_follows_and_mattes_fit_too(limited, what):
+    source, reader = film(**({"dtype": np.float16, "transfer": "linear"} if "floats" in what else {})), None
     rng, room = np.random.default_rng(5), 96
     shown = [following(rng, source, moment(), (0, 1)) for _ in range(2)]
-    if kind == "mattes":
+    if what == "mattes":
         shown, reader, room = [replace(moment(), mattes=mattes(rng, 3))] * 2, Values(source), HOST
     roomy, _, _ = rendered(limited(ROOMY), source, shown, reader)
     small, _, is_short = rendered(limited(PIXELS * room), source, shown, reader)
