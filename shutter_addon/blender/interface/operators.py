@@ -403,6 +403,9 @@ class SHUTTER_OT_copy_report(Named, Operator):
     icon = "COPYDOWN"
 
     def execute(self, context: Context) -> set[str]:
+        if bpy.app.background:
+            report(self, rpt_("Without a window there is no clipboard: use the command check with --report"), "ERROR")
+            return {"CANCELLED"}
         context.window_manager.clipboard = error_report.text(selection.scene_of(context))
         self.report({"INFO"}, rpt_("Report copied: paste it into your message and read it before you send it"))
         return {"FINISHED"}

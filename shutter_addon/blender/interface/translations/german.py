@@ -1345,6 +1345,8 @@ MESSAGES = {
     "Nichts wird gesendet",
     ("*", "Report copied: paste it into your message and read it before you send it"): "Bericht kopiert: "
     "in die Nachricht einfügen, und vor dem Senden lesen",
+    ("*", "Without a window there is no clipboard: use the command check with --report"): "Ohne Fenster gibt es keine "
+    "Zwischenablage: der Befehl check mit --report gibt den Bericht aus",
     # Devices
     ("Virtual Shutter", "Render Device"): "Rendergerät",
     (
