@@ -154,7 +154,7 @@ def following(count: int, window: int, size) -> Following:
 
 def combining(state: FrameState, mode: str) -> FrameState:
     """The state whose shutters all make that of the frames."""
-    return replace(state, combines=(Combine.of(mode),) * len(state.bars))
+    return replace(state, combines=(Combine(mode),) * len(state.bars))
 
 
 def combined_reference(state: FrameState, mode: str, codes: np.ndarray, c: np.ndarray) -> np.ndarray:
@@ -162,9 +162,9 @@ def combined_reference(state: FrameState, mode: str, codes: np.ndarray, c: np.nd
     encoded = state.options.light == "encoded"
     lights = codes / 255.0 if encoded else light.premultiplied(codes / 255.0, light.to_linear)
     c = np.maximum(c, 0).astype(np.float64)
-    weights = combined.counts(Combine.of(mode), state.bars, (c / c.sum(axis=0)).T, state.options.interpolation)
+    weights = combined.counts(Combine(mode), state.bars, (c / c.sum(axis=0)).T, state.options.interpolation)
     samples = [combined.Sample(own[:, None], weights[:, None, k]) for k, own in enumerate(lights)]
-    found = combined.of_samples(Combine.of(mode), samples, encoded=encoded)[:, 0, :3]
+    found = combined.of_samples(Combine(mode), samples, encoded=encoded)[:, 0, :3]
     return light.to_linear(found) if encoded else found
 
 

@@ -68,7 +68,7 @@ def _moved(way, light, quads, packed, at=(False, False), **others):
 def _combining():
     for mode, way in (("lightest", "frames"), ("darkest", "search"), ("median", "search"), ("median", "value")):
         has_threshold = mode == "darkest" and {"by_luminance": True, "threshold": 0.5}
-        combine = Combine.of(mode, **(has_threshold or {}))
+        combine = Combine(mode, **(has_threshold or {}))
         for edges, kind in ((1, "rgba8"), (2, "rgba16f")):
             light = _light(1, kind != "rgba8", edges == 2, edges == 1, combine=combine, kind=kind)
             yield composition(way, 3, **light, EDGES=edges)

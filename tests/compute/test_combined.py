@@ -9,15 +9,15 @@ from test_composition import SHAPES, check, footage, state
 from shutter_addon.core.model.frame_state import Combine, Following
 from shutter_addon.core.pixels import combined
 
-LIGHTEST, DARKEST, MEDIAN = (Combine.of(mode) for mode in ("lightest", "darkest", "median"))
+LIGHTEST, DARKEST, MEDIAN = (Combine(mode) for mode in ("lightest", "darkest", "median"))
 MODES = {
     "lightest": LIGHTEST,
     "darkest": DARKEST,
     "median": MEDIAN,
-    "by luminance": Combine.of("lightest", by_luminance=True),
-    "dark by luminance": Combine.of("darkest", by_luminance=True),
-    "threshold": Combine.of("lightest", threshold=0.4, softness=0.3),
-    "dark threshold": Combine.of("darkest", True, threshold=0.2, softness=0.1),
+    "by luminance": Combine("lightest", by_luminance=True),
+    "dark by luminance": Combine("darkest", by_luminance=True),
+    "threshold": Combine("lightest", threshold=0.4, softness=0.3),
+    "dark threshold": Combine("darkest", True, threshold=0.2, softness=0.1),
 }
 
 

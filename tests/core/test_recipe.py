@@ -190,7 +190,7 @@ ONE = '{"version": 2, "window": 1, "shutters": [{"name": "A", "bars": [1]}], '
             "regions[0].width: -inf is not a finite number",
         ),
         ('{"version": 2, "window": 1, "window": 2}', 'recipe: field "window" is given twice'),
-        (ONE + '"time": [{"frame": 1, "value": 1, "frame": 2}]}', 'time[0]: field "frame" is given twice'),
+        (ONE + '"time": [{"frame": 1, "value": 1, "frame": 2}]}', 'recipe: field "frame" is given twice'),
     ],
     ids=lambda value: value[:20],
 )

@@ -18,7 +18,7 @@ from ..rendering import effect_source, invalidation, sessions
 
 def summary(weights: np.ndarray, combine: str = "AVERAGE") -> str:
     """Return a text about bars (L,): their angle and number of frames, or what they combine (choices.COMBINES)."""
-    if not shutters.exposure(weights):
+    if not np.any(weights):
         return iface_("All bars are zero: the shutter never opens")
     if combine != "AVERAGE":
         name, count = next(name for word, name, _ in COMBINES if word == combine), np.count_nonzero(weights)

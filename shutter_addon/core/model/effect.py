@@ -20,7 +20,7 @@ from ..messages import EffectError
 from . import keyframes, limits, mattes, motions, outlines, scribbles, shutters
 from .choices import BETWEEN, BLENDS, CHANNELS, COMBINES, CONTEXT, LENGTHS, MOTIONS, RAMPS, TIMINGS
 from .fields import MISSING, choice, color, fixed, number, switch
-from .frame_state import Combine, FrameState, Mode
+from .frame_state import EXTREMES, Combine, FrameState, Mode
 from .keyframes import Bars, Channel
 from .motions import Placement
 from .scribbles import Drawings as Drawings
@@ -375,7 +375,7 @@ class Shutter:
         """Return a function that turns bars of filmed frames into bars of moments, `steps` per filmed frame."""
         if self.length == "timeline" or self.has_trail:
             return partial(shutters.held, steps=steps)
-        level = self.combine in ("lightest", "darkest")
+        level = self.combine in EXTREMES
         return partial(shutters.smoothed, steps=steps, backward=backward, level=level)
 
     def filmed(self, moments: ArrayLike, steps: int, position: str) -> shutters.Filmed:
@@ -398,8 +398,12 @@ class Shutter:
         return None
 
     def combine_at(self, frame: float) -> Combine:
-        threshold = float(self.threshold.at(frame)) if self.use_threshold else None
-        return Combine.of(self.combine, self.by_luminance, threshold, float(self.softness.at(frame)))
+        """Return the way to combine frames, with only the settings that affect it, so that equal ways compare equal."""
+        if self.combine not in EXTREMES:
+            return Combine(self.combine)
+        if not self.use_threshold:
+            return Combine(self.combine, self.by_luminance)
+        return Combine(self.combine, self.by_luminance, float(self.threshold.at(frame)), float(self.softness.at(frame)))
 
 
 MatteFiles = Callable[[MatteRegion], mattes.MatteFile]

@@ -39,15 +39,9 @@ class Combine:
     threshold: float | None = None
     softness: float = 0.0
 
-    @staticmethod
-    def of(mode: Mode, by_luminance: bool = False, threshold: float | None = None, softness: float = 0.0) -> Combine:
-        """Return the mode with only the settings that affect it, so that equal modes compare equal."""
-        if mode in ("average", "median"):
-            return Combine(mode)
-        return Combine(mode, by_luminance, threshold, 0.0 if threshold is None else softness)
-
 
 AVERAGE = Combine()
+EXTREMES = "lightest", "darkest"  # the modes that have a threshold
 
 
 @dataclass(frozen=True)

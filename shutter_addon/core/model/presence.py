@@ -39,9 +39,6 @@ class Gap(NamedTuple):
     hard_last: bool = False
 
 
-_NONE_LATER = Gap(first=math.inf, last=math.inf)
-
-
 def keys(
     seen: Collection[int], stops: Iterable[Stop], kept: Collection[int], fade: int = FADE, beside: int = 0
 ) -> list[Key]:
@@ -56,20 +53,19 @@ def keys(
     """
     changes: list[Key] = []
     before = -math.inf
-    for gap, following in pairwise([*gaps(seen, stops, beside), _NONE_LATER]):
-        after = following.first
-        if math.isfinite(gap.first):
-            kept_before = max((frame for frame in kept if frame < gap.first), default=-math.inf)
-            room = min(gap.first - kept_before, max((gap.first - before) // 2, 1))
-            length = 1 if gap.hard_first else int(min(fade, room))
-            changes.append(Key(int(gap.first) - length, 1.0, "constant" if gap.hard_first else "linear"))
-            changes.append(Key(int(gap.first), 0.0, "constant"))
-        if math.isfinite(gap.last):
-            kept_after = min((frame for frame in kept if frame > gap.last), default=math.inf)
-            room = min(kept_after - gap.last, max((after - gap.last) // 2, 1))
-            length = 1 if gap.hard_last else int(min(fade, room))
-            changes.append(Key(int(gap.last), 0.0, "constant" if gap.hard_last else "linear"))
-            changes.append(Key(int(gap.last) + length, 1.0, "constant"))
+    for gap, following in pairwise([*gaps(seen, stops, beside), Gap(first=math.inf, last=math.inf)]):
+        for edge, way, is_hard, other in (
+            (gap.first, -1, gap.hard_first, before),
+            (gap.last, 1, gap.hard_last, following.first),
+        ):
+            if math.isfinite(edge):
+                kept_beyond = min(
+                    (way * (frame - edge) for frame in kept if way * (frame - edge) > 0), default=math.inf
+                )
+                room = min(kept_beyond, max(way * (other - edge) // 2, 1))
+                length = 1 if is_hard else int(min(fade, room))
+                first, second = sorted([(int(edge), 0.0), (int(edge) + way * length, 1.0)])
+                changes += [Key(*first, "constant" if is_hard else "linear"), Key(*second, "constant")]
         before = gap.last
     # The later of two keys at the same frame counts.
     places = {key.frame: place for place, key in enumerate(changes)}

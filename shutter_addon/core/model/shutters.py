@@ -51,14 +51,9 @@ def check_bars(bars: ArrayLike) -> np.ndarray:
         raise ShutterError("a bar is above a million")
     if not bars.any():
         raise ShutterError("all bars are zero: the shutter never opens")
-    if exposure(bars.astype(np.float32)) < np.float32(MIN_EXPOSURE):
+    if bars.astype(np.float32).sum() < np.float32(MIN_EXPOSURE):
         raise ShutterError("the bars are less than a millionth together: the shutter never opens")
     return bars
-
-
-def exposure(bars: ArrayLike) -> float:
-    """Return e = Σ bars: the open time in frames."""
-    return float(np.asarray(bars).sum())
 
 
 def accumulation(bars: ArrayLike) -> np.ndarray:
@@ -299,7 +294,7 @@ def filmed(moments: ArrayLike, steps: int, position: str, spread: Callable[[np.n
 def open_angle(bars: ArrayLike) -> float:
     """Return the shutter angle in degrees: 360 for a window of equal bars."""
     bars = np.asarray(bars, dtype=np.float64)
-    return 360.0 * exposure(bars) / (len(bars) * max(bars.max(), 1e-30))
+    return 360.0 * float(bars.sum()) / (len(bars) * max(bars.max(), 1e-30))
 
 
 # Presets

@@ -61,11 +61,8 @@ def of_samples(combine: Combine, samples: Sequence[Sample], *, encoded: bool = F
     Args:
         encoded: Whether light is encoded (Options.light).
     """
-    return median(samples) if combine.mode == "median" else extreme(combine, samples, encoded=encoded)
-
-
-def extreme(combine: Combine, samples: Sequence[Sample], *, encoded: bool = False) -> np.ndarray:
-    """Return the lightest or the darkest (H, W, 4), without frames of weight 0."""
+    if combine.mode == "median":
+        return median(samples)
     best = np.full((*samples[0].weight.shape, 3), -np.inf)
     alpha, most = np.zeros(best.shape[:2]), np.zeros(best.shape[:2])
     for sample in samples:

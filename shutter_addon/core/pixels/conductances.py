@@ -33,15 +33,9 @@ def resistances(guide: np.ndarray, strength: float) -> np.ndarray:
 
 
 def cell_side(cells: tuple[int, int], pixels: tuple[int, int]) -> int:
-    """Return the side of a cell in pixels, a power of two, for cells (rows, columns) that cover pixels (rows, columns).
-
-    Raises:
-        ValueError: No side fits.
-    """
-    for side in (1 << k for k in range(16)):
-        if all(-(-n // side) == count for n, count in zip(pixels, cells, strict=True)):
-            return side
-    raise ValueError(f"a guide of {cells[1]} × {cells[0]} cells does not fit {pixels[1]} × {pixels[0]} pixels")
+    """Return the side of a cell in pixels, a power of two; `cells` and `pixels` are (rows, columns)."""
+    sides = (1 << k for k in range(16))
+    return next(side for side in sides if all(-(-n // side) == count for n, count in zip(pixels, cells, strict=True)))
 
 
 def of_pixels(cells: np.ndarray, shape: tuple[int, int]) -> np.ndarray:

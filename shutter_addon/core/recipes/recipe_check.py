@@ -6,8 +6,9 @@ import json
 from typing import Any
 
 from ..model import limits, shutters
+from ..model.frame_state import EXTREMES
 from .recipe import CAMERA, RecipeError
-from .records import COMBINED, drawn_in
+from .records import drawn_in
 
 
 def shown(value: Any) -> str:
@@ -72,7 +73,7 @@ def _check_exposure(shutter: Any, place: str) -> None:
     if shutter.trail is not None:
         _require(shutter.follow, f"{place}.trail", "the shutter follows nothing that moves")
         _require(shutter.length == "bars", f"{place}.trail", "a shutter has one length")
-    chooses = shutter.combine in COMBINED
+    chooses = shutter.combine in EXTREMES
     only = "only lightest and darkest have a threshold"
     _require(chooses or shutter.threshold is None, f"{place}.threshold", only)
     is_soft = isinstance(shutter.softness, list) or shutter.softness != 0

@@ -7,7 +7,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import fields, is_dataclass
+from dataclasses import is_dataclass
 from functools import cache, partial
 from pathlib import Path
 from types import NoneType, UnionType
@@ -16,8 +16,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_
 from .. import atomic_write
 from ..model import effect as model
 from ..model import limits
-from ..model.fields import fields_of
-from ..model.frame_state import Options
 from . import recipe_check, records
 from .recipe import RecipeError
 from .recipe_check import cut, plain, shown
@@ -88,7 +86,7 @@ def parse(text: str) -> model.Effect:
 
 def dump(effect: model.Effect) -> str:
     """Return a recipe as JSON text that `parse` reads. Fields without meaning are left out."""
-    text = json.dumps(_said(records.recipe_of(effect)), indent=1, ensure_ascii=False)
+    text = json.dumps(records.recipe_of(effect), indent=1, ensure_ascii=False)
     # People edit these files: keep a list of numbers on one line. The pattern also matches strings, to skip them.
     return re.sub(r'"(?:[^"\\]|\\.)*"|\[[-+.\de,\s]+\]', _on_one_line, text) + "\n"
 
@@ -104,38 +102,12 @@ def save(effect: model.Effect, path: str | Path) -> None:
         part.write_text(dump(effect), encoding="utf-8")
 
 
-# Defaults of fields that few recipes need; they are written only with another value.
-_UNTOLD = {
-    each.recipe: each.absent
-    for each in fields_of(
-        Options, model.Effect, model.Camera, model.Shutter, model.Region, model.OutlineRegion
-    ).values()
-    if each.recipe and not each.told
-} | {"length": "bars", "keys": [], "not_strokes": [], "time": [], "camera": []}
-
-
-def _said(value: Any) -> Any:
-    """Return records as JSON data."""
-    if is_dataclass(value):
-        columns = {each.name: getattr(value, each.name) for each in fields(value)}
-        told = {k: v for k, v in columns.items() if v is not None and (k not in _UNTOLD or v != _UNTOLD[k])}
-        return {k: _said(v) for k, v in told.items()}
-    return [_said(each) for each in value] if isinstance(value, list | tuple) else value
-
-
-class _Doubled(dict):
-    """A JSON object with a duplicate field, whose name is in `field`."""
-
-    field: str
-
-
 def _object(pairs: list) -> dict:
     fields = dict(pairs)
-    if len(fields) == len(pairs):
-        return fields
-    doubled = _Doubled(fields)
-    doubled.field = Counter(name for name, _ in pairs).most_common(1)[0][0]
-    return doubled
+    if len(fields) < len(pairs):
+        twice = Counter(name for name, _ in pairs).most_common(1)[0][0]
+        raise RecipeError(f"recipe: field {shown(twice)} is given twice")
+    return fields
 
 
 def _whole(digits: str) -> int | float:
@@ -239,8 +211,6 @@ def _dataclass(kind: Any, converter: Converter) -> Callable[[Any, Any], Any]:
     def structure(value: Any, kind: Any) -> Any:
         if not isinstance(value, dict):
             raise ValueError(f"{shown(value)} is not an object")
-        if isinstance(value, _Doubled):
-            raise ValueError(f"field {shown(value.field)} is given twice")
         return structure_fields(value, kind)
 
     return structure

@@ -5,8 +5,9 @@ is the strip's first. Points are fractions of the picture, y up.
 """
 
 import math
+from collections.abc import Iterable
 from copy import copy
-from dataclasses import dataclass, field, make_dataclass, replace
+from dataclasses import asdict, dataclass, field, make_dataclass, replace
 from functools import cache, partial
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -15,12 +16,11 @@ import numpy as np
 from ..model import effect as model
 from ..model import keyframes, limits, mattes
 from ..model.fields import MISSING, Field, fields_of
-from ..model.frame_state import Options
+from ..model.frame_state import EXTREMES, Options
 from ..model.keyframes import Channel, Constant, Ease, Keys
 from ..model.motions import Placement
 from .recipe import CAMERA
 
-COMBINED = "lightest", "darkest"  # ways to combine frames that have thresholds
 VERSION = 2  # the newest that is read; in version 1, bars counted moments between filmed frames
 
 
@@ -312,67 +312,68 @@ def _drawings(name: str, drawn: list[Drawing]) -> model.Drawings:
     return model.Drawings(name=name, frames=frames, strokes=strokes, eases=eases, aspect=1.0)
 
 
-def recipe_of(effect: model.Effect) -> Any:
-    """Return the record of an effect with constant or keyed channels and unique names of shutters."""
+def recipe_of(effect: model.Effect) -> dict[str, Any]:
+    """Return the JSON of an effect with constant or keyed channels and unique names of shutters."""
     options, names = effect.options.at(1), [shutter.name for shutter in effect.shutters]
-    return RecipeRecord(
-        version=VERSION,
-        shutters=[_shutter_record(shutter) for shutter in effect.shutters],
-        regions=[_region_record(region, names[region.shutter]) for region in effect.regions],
-        time=_keyable(effect.time.numbers) if isinstance(effect.time, keyframes.SourceTime) else [],
-        camera=[MoveKey(**key) for key in _move_keys(effect.camera.moves)],
-        **_words(Options, options),
-        **_words(model.Effect, effect),
-        **_words(model.Camera, effect.camera),
-    )
+    said = {"version": VERSION} | _words(Options, options) | _words(model.Effect, effect)
+    said |= _words(model.Camera, effect.camera)
+    said["shutters"] = [_shutter_words(shutter) for shutter in effect.shutters]
+    said["regions"] = [_region_words(region, names[region.shutter]) for region in effect.regions]
+    if isinstance(effect.time, keyframes.SourceTime):
+        said["time"] = _keyable(effect.time.numbers)
+    if keys := _move_keys(effect.camera.moves):
+        said["camera"] = keys
+    return said
 
 
 def _words(kind: type, part: Any) -> dict[str, Any]:
     """Return the recipe's fields for an object of a class; the inverse of `_values`."""
-    said = {each.recipe: (each, getattr(part, name)) for name, each in fields_of(kind).items() if each.recipe}
-    return {word: _keyable(value) if each.is_channel else value for word, (each, value) in said.items()}
+    said = {}
+    for name, each in fields_of(kind).items():
+        if each.recipe:
+            value = _keyable(getattr(part, name)) if each.is_channel else getattr(part, name)
+            if each.told or value != each.absent:
+                said[each.recipe] = value
+    return said
 
 
-def _keyable(channel: Channel) -> Keyable:
-    if isinstance(channel, Keys):
-        return [ValueKey(*key) for key in zip(channel.frames, channel.values, channel.eases, strict=True)]
-    return float(channel.at(1))
+def _keyable(channel: Channel) -> Any:
+    """Return a number, or its keys."""
+    return _keys_of(channel, value=channel.values) if isinstance(channel, Keys) else float(channel.at(1))
 
 
-def _shutter_record(shutter: model.Shutter) -> Any:
-    said = _words(model.Shutter, shutter)
-    if isinstance(shutter.follow, model.AnyRegion):
-        said["follow"] = shutter.follow.name
-    elif shutter.follow:
-        said["follow"] = CAMERA
-    else:
-        del said["follow_motion"], said["follow_smooth"]
+def _keys_of(channel: Keys, **columns: Iterable) -> list[dict[str, Any]]:
+    """Return the keys of a channel, with these fields beside frame and ease."""
+    rows = zip(channel.frames, channel.eases, *columns.values(), strict=True)
+    return [dict(zip(("frame", "ease", *columns), row, strict=True)) for row in rows]
+
+
+def _shutter_words(shutter: model.Shutter) -> dict[str, Any]:
+    said, chooses = _words(model.Shutter, shutter), shutter.combine in EXTREMES
+    unused = set() if shutter.follow else {"follow_motion", "follow_smooth"}
+    if shutter.follow:
+        said["follow"] = shutter.follow.name if isinstance(shutter.follow, model.AnyRegion) else CAMERA
     if shutter.length == "timeline":
         said["length"] = "timeline"
     if shutter.has_trail:
         said["trail"] = _keyable(shutter.trail)
-    chooses = shutter.combine in COMBINED
     if chooses and shutter.use_threshold:
         said["threshold"] = _keyable(shutter.threshold)
     else:
-        del said["softness"]
-    said["by_luminance"] = chooses and shutter.by_luminance
+        unused |= {"softness"} if chooses else {"softness", "by_luminance"}
     bars = shutter.bars.channel
     if isinstance(bars, Keys):
-        keys = zip(bars.frames, bars.values, bars.eases, strict=True)
-        said["keys"] = [BarsKey(frame, each.tolist(), ease) for frame, each, ease in keys]
+        said["keys"] = _keys_of(bars, bars=[each.tolist() for each in bars.values])
     else:
         said["bars"] = bars.at(1).tolist()
-    return ShutterRecord(**said)
+    return {name: value for name, value in said.items() if name not in unused}
 
 
 def _move_keys(moves: model.Moves) -> list[dict[str, Any]]:
-    """Return the fields of the keys of `moves`."""
-    names, channels = ("location", "rotation", "scale"), (moves.location, moves.rotation, moves.scale)
+    numbers = {"location": moves.location, "rotation": moves.rotation, "scale": moves.scale}
     if not isinstance(moves.location, Keys):
         return []
-    columns = zip(moves.location.frames, moves.location.eases, *(each.values for each in channels), strict=True)  # type: ignore[attr-defined]
-    return [{"frame": frame, "ease": ease} | dict(zip(names, key, strict=True)) for frame, ease, *key in columns]
+    return _keys_of(moves.location, **{name: channel.values for name, channel in numbers.items()})  # type: ignore[attr-defined]
 
 
 def _strokes_of(drawings: model.Drawings) -> dict[float, list[Stroke]]:
@@ -381,31 +382,34 @@ def _strokes_of(drawings: model.Drawings) -> dict[float, list[Stroke]]:
     return dict(zip(drawings.frames, drawn, strict=True))
 
 
-def _region_record(region: Any, shutter: str) -> Any:
+def _region_words(region: Any, shutter: str) -> dict[str, Any]:
     said = _words(type(region), region) | {"shutter": shutter}
-    keys = {key["frame"]: key for key in _move_keys(region.moves)}
-    if not isinstance(region, model.Region | model.OutlineRegion | model.SubjectRegion):
-        said |= {"keys": [MoveKey(**key) for key in keys.values()]} | _words(type(region.content), region.content)
-        if isinstance(region.content, model.RampContent):
-            return RampRecord(**said)
-        return MatteRecord(path=region.content.path, channel=region.content.channel, **said)
-    drawn = _strokes_of(region.drawings)
+    keys, drawn = {key["frame"]: key for key in _move_keys(region.moves)}, {}
     if isinstance(region, model.SubjectRegion):
-        said |= {"strokes": _keyed(drawn), "not_strokes": _keyed(_strokes_of(region.nots))}
+        said |= {"kind": "subject", "strokes": _keyed(region.drawings)}
+        if region.nots.frames:
+            said["not_strokes"] = _keyed(region.nots)
         drawn = _strokes_of(region.outlines)
-    else:
+    elif isinstance(region, model.Region | model.OutlineRegion):
         # The region carries the first drawing; keys carry the others.
-        first = region.drawings.frames[0]
-        said["strokes"] = drawn[first]
+        drawn, first = _strokes_of(region.drawings), region.drawings.frames[0]
+        said |= {"kind": region.kind.at(1) if isinstance(region, model.Region) else "outline", "strokes": drawn[first]}
         if len(drawn) == 1 or first == min(keys):
             del drawn[first]
-    placed = {frame: {"frame": frame} for frame in drawn} | keys
-    said["keys"] = [RegionKey(strokes=drawn.get(frame), **placed[frame]) for frame in sorted(placed)]
-    if isinstance(region, model.Region):
-        return RegionRecord(kind=region.kind.at(1), **said)
-    return (SubjectRecord if isinstance(region, model.SubjectRegion) else OutlineRecord)(**said)
+    else:
+        said |= _words(type(region.content), region.content)
+        is_file = isinstance(region.content, model.FileContent)
+        said["kind"] = "matte" if is_file else "ramp"
+        if is_file:
+            said |= {"path": region.content.path, "channel": region.content.channel}
+    placed = {frame: asdict(MoveKey(frame)) for frame in drawn} | keys
+    with_strokes = {frame: {"strokes": strokes} for frame, strokes in drawn.items()}
+    if placed:
+        said["keys"] = [placed[frame] | with_strokes.get(frame, {}) for frame in sorted(placed)]
+    return said
 
 
-def _keyed(drawn: dict[float, list[Stroke]]) -> Any:
+def _keyed(drawings: model.Drawings) -> list:
     """Return a subject's strokes, without keys if they are of frame 1."""
-    return drawn[1] if list(drawn) == [1] else [StrokesKey(*each) for each in drawn.items()]
+    drawn = _strokes_of(drawings)
+    return drawn[1] if list(drawn) == [1] else [{"frame": f, "strokes": strokes} for f, strokes in drawn.items()]

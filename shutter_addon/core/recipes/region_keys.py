@@ -38,30 +38,31 @@ def with_placements(
         size: Of the picture.
         thin: Leave out keys that the motion does not need, to within a pixel, or a quarter of one for a camera.
     """
-    if isinstance(moving, Camera):
-        chosen = motions.thinned(placements, CORNERS, size, exact, STEADY) if thin else sorted(placements)
-        return replace(moving, moves=_moves(moving, placements, exact, chosen, {}))
-    drawings = replace(moving.drawings, aspect=size[0] / size[1])
-    if isinstance(moving, SubjectRegion):
-        shape = np.concatenate([motions.offsets(strokes) for strokes in (*drawings.strokes, *moving.outlines.strokes)])
-        chosen = motions.thinned(placements, shape, size, exact) if thin else sorted(placements)
-        return replace(moving, moves=_moves(moving, placements, exact, chosen, {}))
-    keyed = _eases(moving)
+    drawings = moving.drawings if isinstance(moving, Region | OutlineRegion) else None
+    keyed, starts = (_eases(moving), drawings.frames) if drawings else ({}, ())
     # A drawing without a key of its own exists from the first key on.
-    drawn = [frame for frame in drawings.frames if frame in keyed]
-    eases = {frame: keyed[frame] for frame in drawn if len(drawings.frames) > 1}
+    drawn = [frame for frame in starts if frame in keyed]
+    eases = {frame: keyed[frame] for frame in drawn if len(starts) > 1}
     chosen = sorted(placements)
     if thin:
         # After a drawing whose ease is not linear, keep the motion straight.
         straight: set[float] = {frame + 1 for frame, ease in eases.items() if ease != "linear"}
-        shape = np.concatenate([motions.offsets(strokes) for strokes in drawings.strokes])
-        chosen = motions.thinned(placements, shape, size, {*exact, *drawn, *straight})
-    moves = _moves(replace(moving, drawings=drawings), placements, exact, chosen, eases)
-    assert isinstance(moves.location, Keys)
-    if len(drawings.frames) == 1 or drawings.frames[0] not in keyed:
-        frames = moves.location.frames[0], *drawings.frames[1:]
-        drawings = replace(drawings, frames=frames)
-    return replace(moving, moves=moves, drawings=replace(drawings, aspect=moving.drawings.aspect))
+        tolerance = STEADY if isinstance(moving, Camera) else 1.0
+        chosen = motions.thinned(placements, _shape(moving), size, {*exact, *drawn, *straight}, tolerance)
+    moves = _moves(moving, placements, exact, chosen, eases)
+    if drawings and (len(starts) == 1 or starts[0] not in keyed):
+        assert isinstance(moves.location, Keys)
+        frames = moves.location.frames[0], *starts[1:]
+        moving = replace(moving, drawings=replace(drawings, frames=frames))
+    return replace(moving, moves=moves)
+
+
+def _shape(moving: Camera | Region | OutlineRegion | SubjectRegion) -> np.ndarray:
+    """Return the points (n, 2) of what moves, relative to its centre."""
+    if isinstance(moving, Camera):
+        return CORNERS
+    outlines = moving.outlines.strokes if isinstance(moving, SubjectRegion) else ()
+    return np.concatenate([motions.offsets(strokes) for strokes in (*moving.drawings.strokes, *outlines)])
 
 
 def _eases(moving: Subject) -> dict[float, Ease]:
