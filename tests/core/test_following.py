@@ -76,18 +76,6 @@ def test_shutters_may_follow_one_region_in_ways_of_their_own():
     assert found == pytest.approx([-2j, 1])
 
 
-def test_where_the_camera_counts_for_nothing_the_shown_frame_alone_is_exposed():
-    camera = [key(0), key(100, (1, 0.5))]
-    source = made(position="center", follow="camera", camera=camera)
-    bars = {}
-    for influence in (0.0, 0.5, 1.0):
-        camera = dataclasses.replace(source.camera, influence=Constant(influence))
-        bars[influence] = state_of(source.with_parts(source.regions, camera), 11, 10).bars[0]
-    assert bars[0.0] == pytest.approx([0, 0, 6, 0, 0, 0])
-    assert bars[0.5] == pytest.approx(np.array([0, 1, 1, 1, 0.5, 0]) * 6 / 3.5)
-    assert bars[1.0].tolist() == [1.0] * 6
-
-
 @pytest.mark.parametrize("keys", [[], STRAIGHT[:1], [key(0, scale=0), key(9, (1, 1))]])
 def test_what_does_not_move_is_nothing_to_follow(keys):
     """The state is that of an effect which follows nothing."""

@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from shutter_addon.core.model import trails
 from shutter_addon.core.model.frame_state import Options
 
-HALF = [1, 1, 1, 1, 0, 0, 0, 0]  # 180°
 OPEN = [1] * 8
 
 
@@ -27,13 +26,6 @@ def test_as_it_was_filmed_and_slower_it_is_the_shown_frame():
         np.testing.assert_allclose(bars, [8, 0, 0, 0, 0, 0, 0, 0], atol=1e-9)
     np.testing.assert_allclose(exposed(OPEN, 2, step=4), [4, 4, 0, 0, 0, 0, 0, 0])
     np.testing.assert_allclose(exposed(OPEN, 5, step=4), [1.6] * 5 + [0, 0, 0])
-
-
-def test_speed_that_changes_within_a_frame_counts():
-    """Half of a frame at one source frame, the other at three: half open, it is one."""
-    places = np.array([98.0, 99.0, 100.0, 101.0, 104.0])
-    bars = trails.on_timeline(np.array(HALF, float), Options(8), places)
-    np.testing.assert_allclose(bars, [4, 0, 0, 0, 0, 0, 0, 0], atol=1e-9)
 
 
 @pytest.mark.parametrize("position", ["start", "center", "end"])

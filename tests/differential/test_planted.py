@@ -25,9 +25,7 @@ def test_mixed_recipes_have_every_field_with_every_other():
 
     def fields(recipe):
         shutters_, regions = recipe["shutters"], recipe["regions"]
-        found = {
-            (name, recipe[name]) for name in ("position", "interpolation", "light", "exposure", "edges", "inbetween")
-        }
+        found = {(name, recipe[name]) for name in single}
         found |= {name for name in ("time", "camera", "border", "edge_aware", "stop_at_cuts") if recipe.get(name)}
         found |= {(name, each[name]) for each in shutters_ for name in ("combine", "length") if name in each}
         found |= {

@@ -10,15 +10,12 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-from ..messages import UserError, sentence
+from ..messages import UserError
 from ..model.effect import Effect, FileContent, MatteRegion, Region
 
 
 class RecipeError(UserError, ValueError):
     """A recipe breaks the format. The message is one sentence that begins with the place."""
-
-    def __init__(self, text: str):
-        super().__init__(sentence(text))
 
 
 # The name by which a shutter follows the camera.
