@@ -284,8 +284,9 @@ def asked_of(case: Case, source, folder: Path):
     return Request(*state_at(effect, clip, case.frame))
 
 
-def exact_layers(case: Case, source, footage, index: int, direction: int) -> dict:
-    """The reference's mattes of layers, by source frame, where there are any; along edges as exact_coefficients."""
+def solving(case: Case, source):
+    """A function that gives the exact coefficients of labels in a source frame at a time; along edges the core's own,
+    of the guide that the product has, as that is no matter of precision."""
     import exact_diffusion
 
     from shutter_addon.compute.guide import Guides, guiding
@@ -299,9 +300,16 @@ def exact_layers(case: Case, source, footage, index: int, direction: int) -> dic
         guide = Guides(source).guide(guiding(frame, 1, range(source.count)), recipe["aggregate"])
         return exact_diffusion.solve(labels + 1, count, guide, strength)
 
+    return solve
+
+
+def exact_layers(case: Case, source, footage, index: int, direction: int) -> dict:
+    """The reference's mattes of layers, by source frame, where there are any."""
+    recipe = json.loads(case.recipe)
     if not layers_at(recipe, case.frame):
         return {}
-    return layer_mattes(recipe, case.frame, footage, index, direction, case.matte_samples(), solve)
+    asked = recipe, case.frame, footage, index, direction, case.matte_samples()
+    return layer_mattes(*asked, solving(case, source))
 
 
 def matte_file(folder: Path, source, region):
@@ -313,20 +321,10 @@ def matte_file(folder: Path, source, region):
 
 
 def exact_coefficients(case: Case, source, footage, index: int) -> np.ndarray:
-    """The reference's; along edges the core's own, of the guide that the product has, as that is no matter of
-    precision."""
-    import exact_diffusion
-
-    from shutter_addon.compute.guide import Guides, guiding
-
-    recipe, size, solve = json.loads(case.recipe), (source.width, source.height), None
-    if strength := number_at(recipe.get("edge_aware", 0), case.frame):
-        guide = Guides(source).guide(guiding(index, 1, range(source.count)), recipe["aggregate"])
-
-        def solve(labels, count):
-            return exact_diffusion.solve(labels + 1, count, guide, strength)
-
-    mix = coefficients(recipe, case.frame, *size, solve)
+    """The reference's."""
+    recipe, solve = json.loads(case.recipe), solving(case, source)
+    size = source.width, source.height
+    mix = coefficients(recipe, case.frame, *size, lambda labels, count: solve(labels, count, index, case.frame))
     return laid(recipe, case.frame, index, mix, footage, case.matte_samples())
 
 

@@ -468,17 +468,14 @@ def followed(recipe, shutter):
 
 def subject(recipe, name):
     """A function of a timeline frame and the aspect that tells of what is followed its centre and its placement."""
-    if name == "camera":
-        keys = recipe.get("camera", [])
-        return lambda frame, aspect: (aspect / 2 + 0.5j, placement(keys, frame) if keys else STILL)
-    region = next(region for region in recipe["regions"] if region["name"] == name)
-    keys = region.get("keys")
-    if not is_drawn(region):
-        return lambda frame, aspect: (aspect / 2 + 0.5j, placement(keys, frame) if keys else STILL)
-    return lambda frame, aspect: (
-        middle(drawn_at(region, frame, aspect)),
-        placement(keys, frame) if keys else STILL,
-    )
+    region = next((region for region in recipe["regions"] if name != "camera" and region["name"] == name), {})
+    keys = recipe.get("camera") if name == "camera" else region.get("keys")
+
+    def told(frame, aspect):
+        centre = middle(drawn_at(region, frame, aspect)) if region and is_drawn(region) else aspect / 2 + 0.5j
+        return centre, placement(keys, frame) if keys else STILL
+
+    return told
 
 
 STILL = np.array([0.0, 0, 0, 1])

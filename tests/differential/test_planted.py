@@ -1,14 +1,12 @@
 """Whether the differential test finds faults: each that is planted here makes a picture wrong. A long check, which runs
 when the files of this folder change."""
 
-import itertools
-import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from cases import make, make_smooth
+from cases import make_smooth
 from compare import open_devices
 from test_differential import MIXED, each_difference
 
@@ -18,40 +16,6 @@ from shutter_addon.core.model import following, keyframes, mattes, scribbles, sh
 from shutter_addon.core.pixels import combined, compositor, layering
 from shutter_addon.devices import gl
 from shutter_addon.media import matte_values
-
-
-def test_mixed_recipes_have_every_field_with_every_other():
-    single = "position", "interpolation", "light", "exposure", "edges", "inbetween"
-
-    def fields(recipe):
-        shutters_, regions = recipe["shutters"], recipe["regions"]
-        found = {(name, recipe[name]) for name in single}
-        found |= {name for name in ("time", "camera", "border", "edge_aware", "stop_at_cuts") if recipe.get(name)}
-        found |= {(name, each[name]) for each in shutters_ for name in ("combine", "length") if name in each}
-        found |= {
-            name for each in shutters_ for name in ("follow", "trail", "threshold", "by_luminance") if name in each
-        }
-        found |= {(each["follow_motion"], bool(each["follow_smooth"])) for each in shutters_ if "follow" in each}
-        found |= {each["kind"] for each in regions} | {"layer" for each in regions if each.get("layer")}
-        found |= {("opacity", isinstance(each["opacity"], list)) for each in regions if each["opacity"] != 1}
-        found |= {"influence"} if recipe.get("camera_influence", 1) != 1 else set()
-        found |= {"aggregate"} if recipe["aggregate"] > 1 else set()
-        names = [each["name"] for each in regions]
-        return found | ({"equal names"} if len(set(names)) < len(names) else set())
-
-    pairs, every = set(), set()
-    for recipe in (json.loads(make(seed, mixed=True).recipe) for seed in range(500)):
-        found = fields(recipe)
-        every |= found
-        pairs |= {frozenset(pair) for pair in itertools.combinations(found, 2)}
-    lacking = [
-        (a, b)
-        for a, b in itertools.combinations(every, 2)
-        if frozenset((a, b)) not in pairs and not (a[0] == b[0] and a[0] in single)
-    ]
-    assert len(every) == 48
-    assert not lacking
-
 
 FAULTS = {
     "an ease": (keyframes, "eased", lambda u, ease: u),

@@ -36,7 +36,6 @@ class Field:
         shown: Whether the panel shows it without further code, below the rest.
         told: Whether recipes write it even if it equals `absent`.
         subtype, context: Of Blender's property, and of the label's translation.
-        since: The first version of the extension that has it.
     """
 
     label: str
@@ -57,7 +56,6 @@ class Field:
     subtype: str = "NONE"
     precision: int = 2
     context: str = "*"
-    since: str = "0.1.0"
 
     @property
     def words(self) -> tuple[Any, ...]:
