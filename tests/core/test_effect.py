@@ -20,7 +20,7 @@ def made(bars, regions=(), **options) -> effect.Effect:
 
 def region(strokes, placement=None, name="Face") -> effect.Region:
     drawings = effect.Drawings(name, (1.0,), (strokes,), ("linear",), 1.0, placement)
-    return effect.Region(moves=effect.Moves(), name=name, shutter=0, kind=Constant("line"), drawings=drawings)
+    return effect.Region(moves=effect.Moves(), name=name, shutter=0, kind="line", drawings=drawings)
 
 
 def test_an_error_among_samples_is_raised_at_its_frame_alone():
@@ -46,11 +46,11 @@ def changed(**channels) -> effect.Effect:
     frames = channels.pop("drawn", (1.0,))
     drawings = effect.Drawings("Face", frames, strokes[: len(frames)], ("linear",) * len(frames), 1.0, placement)
     numbers = {name: channels.pop(name) for name in ("location", "rotation", "scale") if name in channels}
-    kind, width = (channels.pop(name, Constant(value)) for name, value in (("kind", "line"), ("width", 0.1)))
+    width = channels.pop("width", Constant(0.1))
     ramp = Constant(mattes.Ramp("linear", (0, 0), 0.0, 1.0))
     matte = {"content": ramp, "opacity": Constant(1.0), "feather": Constant(0.0)} | channels
     regions = (
-        effect.Region(moves=effect.Moves(**numbers), shutter=0, kind=kind, width=width, drawings=drawings),
+        effect.Region(moves=effect.Moves(**numbers), shutter=0, kind="line", width=width, drawings=drawings),
         effect.MatteRegion(moves=effect.Moves(), shutter=0, **matte),
     )
     return effect.Effect((effect.Shutter(name="Sharp", bars=Bars(bars)),), regions, options, edge_aware=edge_aware)
@@ -69,7 +69,6 @@ def test_bars_that_are_closed_are_told_with_their_frame():
         {"bars": keyed(FIRST, LAST)},
         {"options": Samples({1: Options(4), 3: Options(4, border=True)})},
         {"edge_aware": keyed(0.0, 1.0)},
-        {"kind": Samples({1: "line", 3: "lasso"})},
         {"width": keyed(0.1, 0.2)},
         {"location": keyed((0, 0), (1, 1))},
         {"rotation": keyed(0, 90)},

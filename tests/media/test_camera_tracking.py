@@ -66,7 +66,7 @@ def lasso(count):
     drawings = Drawings("subject", (0.0,), ([shape],), ("linear",), WIDTH / HEIGHT)
     location = Keys((0, count), tuple(way), ("linear", "linear"))
     return Region(
-        moves=Moves(location), name="subject", shutter=0, kind=Constant("lasso"), width=Constant(0.0), drawings=drawings
+        moves=Moves(location), name="subject", shutter=0, kind="lasso", width=Constant(0.0), drawings=drawings
     )
 
 

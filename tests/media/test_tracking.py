@@ -109,9 +109,7 @@ def strokes(kind):
 def region(kind, *, drawn=None, location=(0.0, 0.0)):
     drawings = Drawings("r", (0.0,), (strokes(kind) if drawn is None else drawn,), ("linear",), WIDTH / HEIGHT)
     location = location if hasattr(location, "at") else Constant(location)
-    return Region(
-        moves=Moves(location), name="r", shutter=0, kind=Constant(kind), width=Constant(0.02), drawings=drawings
-    )
+    return Region(moves=Moves(location), name="r", shutter=0, kind=kind, width=Constant(0.02), drawings=drawings)
 
 
 def followed(source, kind, start, frames=None, **options):

@@ -138,7 +138,7 @@ def _add_region(
     region = effect.regions.add()
     region.shutter = shutter.name
     if isinstance(source, model.Region):
-        region.kind = source.kind.at(1).upper()
+        region.kind = source.kind.upper()
     elif isinstance(source, model.OutlineRegion):
         region.kind = "OUTLINE"
     elif isinstance(source, model.SubjectRegion):

@@ -382,7 +382,7 @@ def _region(sampling: Sampling, index: int, shutter: int) -> model.Region:
     word = validation.word(region, "kind").lower()
     return model.Region(
         shutter=shutter,
-        kind=keyframes.Constant({"outline": "lasso", "subject": "line"}.get(word, word)),
+        kind={"outline": "lasso", "subject": "line"}.get(word, word),
         drawings=sampling.drawings(index, layer_name=layer_name),
         moves=sampling.moves(region, path),
         **sampling.fields(region, path, model.Region),

@@ -130,9 +130,9 @@ class AnyRegion(Subject):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Region(AnyRegion):
-    """Strokes that give a shutter to what they touch or enclose. `kind`: a channel of "line" or "lasso"."""
+    """Strokes that give a shutter to what they touch (kind "line") or enclose ("lasso")."""
 
-    kind: Channel
+    kind: str
     width: Channel = number(
         "Width",
         "Width of the lines as a fraction of the picture's height",
@@ -145,8 +145,8 @@ class Region(AnyRegion):
 
     def at(self, frame: float) -> scribbles.Shape:
         moved = self.drawings.moved(frame, self.placement(frame))
-        kind, width, opacity = (channel.at(frame) for channel in (self.kind, self.width, self.opacity))
-        return scribbles.Shape(shutter=self.shutter, kind=kind, width=width, strokes=moved, opacity=float(opacity))
+        width, opacity = self.width.at(frame), float(self.opacity.at(frame))
+        return scribbles.Shape(shutter=self.shutter, kind=self.kind, width=width, strokes=moved, opacity=opacity)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -105,8 +105,7 @@ def _blend(layer: MaskLayer, below: np.ndarray, value: np.ndarray) -> np.ndarray
 def _layer_value(layer: MaskLayer, width: int, height: int) -> np.ndarray:
     """Return the coverage of a layer's splines: (height, width) float32, the lowest row first."""
     value = np.zeros((height, width), np.float32)
-    outlines = [_outlines(spline, width, height) for spline in layer.splines]
-    outlined = [both for both in outlines if both is not None]
+    outlined = [_outlines(spline, width, height) for spline in layer.splines if len(spline.points) > 1]
     if not outlined or layer.alpha == 0:
         return value
     _fill(value, [edge for edge, _ in outlined], layer.fill_solver, layer.holes)
@@ -114,19 +113,15 @@ def _layer_value(layer: MaskLayer, width: int, height: int) -> np.ndarray:
     return value
 
 
-def _outlines(spline: MaskSpline, width: int, height: int) -> tuple[np.ndarray, np.ndarray] | None:
+def _outlines(spline: MaskSpline, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the outlines of a spline and of its feather, (n, 2) float64 each, point by point.
 
-    A feather is at least a pixel wide, which is the only anti-aliasing. None: the spline covers nothing.
+    A feather is at least a pixel wide, which is the only anti-aliasing.
     """
     points, weights = np.array(spline.points, np.float64), np.array(spline.weights, np.float64)
-    if len(points) < 2:
-        return None
     steps = _steps(spline, points, weights, max(width, height))
     segment, u = _positions(spline, len(points), steps)
     edge = _at(spline, points, segment, u)
-    if len(edge) < 4:
-        return None
     feather = _offset(spline, points, weights, segment, u, edge)
     larger = max(width, height)
     edge, feather = ((p - 0.5) * (larger / width, larger / height) + 0.5 for p in (edge, feather))

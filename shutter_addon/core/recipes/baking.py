@@ -209,8 +209,6 @@ def _region(
 ) -> Region | MatteRegion | None:
     """Return a region with the recipe's keys, or None if nothing is drawn."""
     said = _said(region, shown) | {"name": name}
-    if isinstance(region, Region):
-        said["kind"] = Constant(region.kind.at(shown.start))
     if isinstance(region, MatteRegion) and not isinstance(region, OutlineRegion | SubjectRegion):
         return replace(region, content=next(contents), moves=_moves(region, {}, shown), **said)
     is_subject = isinstance(region, SubjectRegion)

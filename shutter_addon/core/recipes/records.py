@@ -272,7 +272,7 @@ def _region(record: Any, shutter: int) -> model.Region | model.MatteRegion:
     values["moves"] = _moves(record.keys, drawn=isinstance(record, SubjectRecord))
     values |= {name: _drawings(record.name, drawn) for name, drawn in drawn_in(record).items()}
     if isinstance(record, RegionRecord):
-        values["kind"] = Constant(record.kind)
+        values["kind"] = record.kind
     elif isinstance(record, OutlineRecord | SubjectRecord):
         values["content"] = mattes.FileFrames(file=mattes.NoFile())  # Effect.for_picture sets the file
     elif isinstance(record, MatteRecord):
@@ -393,7 +393,7 @@ def _region_words(region: Any, shutter: str) -> dict[str, Any]:
     elif isinstance(region, model.Region | model.OutlineRegion):
         # The region carries the first drawing; keys carry the others.
         drawn, first = _strokes_of(region.drawings), region.drawings.frames[0]
-        said |= {"kind": region.kind.at(1) if isinstance(region, model.Region) else "outline", "strokes": drawn[first]}
+        said |= {"kind": region.kind if isinstance(region, model.Region) else "outline", "strokes": drawn[first]}
         if len(drawn) == 1 or first == min(keys):
             del drawn[first]
     else:
