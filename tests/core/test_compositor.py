@@ -1,10 +1,11 @@
 """Windows that slide, and what they reach. tests/differential has what their shutters expose."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shutter_addon.core.model import windows
+from shutter_addon.core.model import shutters, windows
 from shutter_addon.core.model.frame_state import FrameState, Options
 
 
@@ -15,6 +16,29 @@ def exposed(moment, index, direction, shot):
         {f: float(bars[frames == f].sum()) for f in set(frames.tolist()) if bars[frames == f].any()}
         for bars in moment.bars
     ]
+
+
+def sliding(bars, **options):
+    return FrameState(Options(np.shape(bars)[1], edges="slide", position="center", **options), np.array(bars, float))
+
+
+def test_the_last_filmed_frame_lasts_as_long_as_others():
+    """In moments as well, so that what lies at its end stays there."""
+    still = sliding([[0, 0, 0, 0, 1, 1, 1, 1, 0, 0, 0, 0], [1] * 12], step=4)
+    found = exposed(windows.slid(still, 36, 1, range(37)), 36, 1, range(37))
+    assert found == [{36: 4}, {**dict.fromkeys(range(28, 36), 1), 36: 4}]
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_what_is_smooth_slides_by_whole_filmed_frames(direction):
+    """So that what is sharp is a filmed frame wherever it slides to, and a streak begins and ends with one."""
+    bars = [[0, 0, 0, 1, 0], [0, 0, 1, 1, 1]]
+    smooth = [shutters.smoothed(row, 4, backward=direction < 0) for row in bars]
+    index, shot = (36, range(20, 37)) if direction > 0 else (20, range(20, 40))
+    found = exposed(windows.slid(sliding(smooth, step=4), index, direction, shot), index, direction, shot)
+    assert found[0] == {index: 1}  # which lay behind the shot's end
+    assert (min(found[1]), max(found[1])) == ((28, 36) if direction > 0 else (20, 28))
+    assert sum(found[1].values()) == pytest.approx(3)
 
 
 @settings(max_examples=200, deadline=None)
