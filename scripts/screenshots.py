@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 from OpenImageIO import ROI, UINT8, ImageBuf, ImageBufAlgo
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "window"))
+sys.path[:0] = [str(Path(__file__).parents[1] / "tests" / folder) for folder in ("window", "blender")]
 import driver
 import story
 
@@ -22,11 +22,11 @@ BODY = [(0.07, 0.80), (0.13, 0.66), (0.22, 0.62), (0.24, 0.45), (0.29, 0.33), (0
 def areas_arranged():
     """A large preview over a low timeline: this window is small."""
     for kind in ("FILE_BROWSER", "PROPERTIES"):
-        with bpy.context.temp_override(window=bpy.context.window_manager.windows[0], area=driver.area_of(kind)):
+        with bpy.context.temp_override(window=driver.windows()[0], area=driver.area_of(kind)):
             bpy.ops.screen.area_close()
         yield 0.5
     area = driver.area_of("SEQUENCE_EDITOR", "SEQUENCER")
-    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
+    with bpy.context.temp_override(window=driver.windows()[0]):
         edge = {"x": area.x + area.width // 2, "y": area.y + area.height}
         bpy.ops.screen.area_move(**edge, delta=TIMELINE - area.height)
     yield 0.5
@@ -111,7 +111,7 @@ def dope_sheet_shown():
     area.ui_type = "DOPESHEET"
     yield 1.0
     where = {"area": area, "region": driver.region_of(area, "CHANNELS")}
-    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0], **where):
+    with bpy.context.temp_override(window=driver.windows()[0], **where):
         bpy.ops.anim.channels_expand()
     yield 0.5
 
