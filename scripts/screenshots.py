@@ -7,7 +7,8 @@ import bpy
 import numpy as np
 from OpenImageIO import ROI, UINT8, ImageBuf, ImageBufAlgo
 
-sys.path[:0] = [str(Path(__file__).parents[1] / "tests" / folder) for folder in ("window", "blender")]
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "blender"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "window"))
 import driver
 import story
 

@@ -1,23 +1,15 @@
 """Footage with too few frames for its exposure: the note in the preview, its button, which makes the streak smooth and
 has the note go, and undo. Run inside Blender, by test_window.py."""
 
-# ruff: noqa: E402 (Blender finds the helpers once it knows their folder)
-import os
-import sys
-from pathlib import Path
-
-sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "blender")]
-sys.path.append(os.environ["SHUTTER_PACKAGES"])
+from functools import partial
 
 import bpy
 import driver
 import full_quality_story as look
 import numpy as np
 import story
-from support import write_frames
 
-COUNT, SIZE, SPEED = 10, (360, 640), 7
-FILM = driver.OUT / "film"
+COUNT, SIZE, SPEED = 10, (180, 320), 7
 BUTTON = "shutter.smooth_streaks"
 
 
@@ -33,14 +25,9 @@ def frame(number):
 
 
 def opened():
-    yield from story.opened()
-    first = write_frames(FILM, [frame(number) for number in range(COUNT)])
-    yield from story.pictures_added(first, SIZE)
-    story.edit().frame_set(3)
-    story.effect().inbetween = "1"
+    yield from story.pictures_opened([frame(number) for number in range(COUNT)], 3)
     bpy.ops.ed.undo_push(message="Start")
-    with driver.override("PREVIEW"):
-        bpy.ops.sequencer.view_all_preview()
+    story.all_viewed()
     yield 1.0
 
 
@@ -50,20 +37,19 @@ def label():
 
 def note():
     """How far it goes from one frame of the exposure to the next, in pixels."""
-    strobing = sys.modules["bl_ext.user_default.virtual_shutter.shutter_addon.blender.rendering.strobing"]
+    strobing = driver.part("blender.rendering.strobing")
     return strobing.last(story.effect())
 
 
-def shown(name):
-    region = story.preview()
-    driver.move(region, region.width / 2, region.height + 12)
-    yield 1.0
-    yield from driver.shot_when_shown(name)
-    driver.saw(step=name, crop=story.crop(), label=label(), smooth=story.effect().inbetween, bars=bar_counts())
+def smooth():
+    return story.effect().inbetween
 
 
 def bar_counts():
     return [len(shutter.bars) for shutter in story.effect().shutters]
+
+
+shown = partial(story.seen, label=label, smooth=smooth, bars=bar_counts)
 
 
 def clicked():
@@ -74,7 +60,7 @@ def clicked():
     yield 0.5
 
 
-def told():
+def steps():
     yield from opened()
     yield from driver.until(note, "the note says it", 30)
     yield from shown("1_steps")
@@ -91,7 +77,3 @@ def told():
     driver.key("ctrl+shift+z")
     yield from driver.until(lambda: story.effect().inbetween != "1", "it is redone")
     yield from shown("4_redone")
-
-
-if __name__ == "__main__":
-    driver.play(told)
