@@ -61,6 +61,7 @@ def made_sharp():
 def turned():
     """By the operators of the buttons, and undone."""
     for name, kind in (("subject_outline", "OUTLINE"), ("subject_scribble", "LINE")):
+        story.effect().edge_aware = 0.0  # edges take a software renderer long
         with driver.override("PREVIEW"):
             getattr(bpy.ops.shutter, name)("INVOKE_DEFAULT", True)
         yield from driver.until(lambda kind=kind: region().kind == kind, f"it is of the kind {kind}")
