@@ -1,14 +1,10 @@
 """Figure 5: scribbles and bar graphs; what swings gets a long exposure, the character a short one."""
 
 from . import stills
-from .item import ASSETS, Item
+from .item import Item, bunny
 from .stills import Panel
 
 FRAME = 45
-
-
-def footage(_folder):
-    return ASSETS / "bigbuckbunny.mp4"
 
 
 def still(shots):
@@ -37,7 +33,7 @@ ITEM = Item(
     name="bunny",
     figure=5,
     title="scribbles and bar graphs",
-    footage=footage,
+    footage=bunny,
     recipes=("bunny.json",),
     frames=(33, 64),
     still=still,

@@ -1,14 +1,10 @@
 """Figure 10: keyed regions follow people; one stays sharp in a blurred crowd, then the reverse."""
 
 from . import stills
-from .item import ASSETS, Item
+from .item import Item, walkers
 from .stills import Panel
 
 ROAD = slice(155, 440), slice(255, 762)
-
-
-def footage(_folder):
-    return ASSETS / "walkers.mp4"
 
 
 def still(shots):
@@ -43,7 +39,7 @@ ITEM = Item(
     name="crowd",
     figure=10,
     title="one sharp in a blurred crowd, and the reverse",
-    footage=footage,
+    footage=walkers,
     recipes=("crowd.json", "crowd-reverse.json"),
     frames=(1, 95),
     still=still,

@@ -1,14 +1,10 @@
 """Median and darkest: a street without those who walk on it, and all of them at once."""
 
 from . import stills
-from .item import ASSETS, Item
+from .item import Item, walkers
 from .stills import Panel
 
 FRAME = 50
-
-
-def footage(_folder):
-    return ASSETS / "walkers.mp4"
 
 
 def still(shots):
@@ -30,7 +26,7 @@ ITEM = Item(
     name="empty_street",
     figure=None,
     title="the median is the street without those who pass",
-    footage=footage,
+    footage=walkers,
     recipes=("empty_street.json",),
     frames=(45, 54),
     still=still,

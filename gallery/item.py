@@ -27,6 +27,16 @@ HERE = ROOT / "gallery"
 ASSETS = ROOT / "assets"
 
 
+def bunny(_folder: Path) -> Path:
+    """Footage that comes with the project: Big Buck Bunny."""
+    return ASSETS / "bigbuckbunny.mp4"
+
+
+def walkers(_folder: Path) -> Path:
+    """People on a street."""
+    return ASSETS / "walkers.mp4"
+
+
 @dataclass(frozen=True)
 class Item:
     """A figure of the paper, or one beyond it.

@@ -7,15 +7,11 @@ The stroke was drawn at frame 22; the recipe has the keys that Track made of it:
 from itertools import zip_longest
 
 from . import stills
-from .item import ASSETS, Item
+from .item import Item, walkers
 from .stills import Panel
 
 FRAMES = 8, 15, 22, 29
 STREET = slice(190, 370), slice(500, 768)
-
-
-def footage(_folder):
-    return ASSETS / "walkers.mp4"
 
 
 def still(shots):
@@ -40,7 +36,7 @@ ITEM = Item(
     name="one_stroke",
     figure=None,
     title="one stroke, tracked, finds the edges of a woman who walks, and as a layer she leaves no ghost",
-    footage=footage,
+    footage=walkers,
     recipes=("one_stroke.json", "one_stroke-plain.json"),
     frames=(1, 34),
     still=still,

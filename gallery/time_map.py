@@ -1,15 +1,11 @@
 """Time maps: every pixel shows its own moment of 33 frames, as a ramp says; the slit-scan classics."""
 
 from . import stills
-from .item import ASSETS, Item
+from .item import Item, bunny
 from .stills import Panel
 
 FRAME = 31  # that is shown
 CROP = slice(0, 720), slice(40, 940)
-
-
-def footage(_folder):
-    return ASSETS / "bigbuckbunny.mp4"
 
 
 def still(shots):
@@ -34,7 +30,7 @@ ITEM = Item(
     name="time_map",
     figure=None,
     title="every pixel shows its own moment, as a ramp says",
-    footage=footage,
+    footage=bunny,
     recipes=("time_map.json", "time_map-angle.json"),
     frames=(1, 100),
     still=still,

@@ -568,7 +568,7 @@ def run(args) -> list[dict]:
     return rows
 
 
-def parse(arguments=None):
+def parse():
     def listed(of, allowed=None):
         def split(text):
             values = [of(part) for part in text.split(",")]
@@ -596,11 +596,11 @@ def parse(arguments=None):
     add("--repeats", type=int, default=5)
     add("--patience", type=float, default=20.0, help="seconds after which a pass is not repeated")
     add("--pixels", type=int, default=2048, help="how many are compared with the reference")
-    return parser.parse_args(arguments)
+    return parser.parse_args()
 
 
-def main(arguments=None) -> None:
-    args = parse(arguments)
+def main() -> None:
+    args = parse()
     rows = run(args)
     if args.json:
         args.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")

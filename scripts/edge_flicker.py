@@ -90,7 +90,7 @@ def run(args) -> list[dict]:
     return rows
 
 
-def parse(arguments=None):
+def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     names = [film.name for film, *_ in FILMS]
     parser.add_argument("--films", nargs="+", choices=names, default=names)
@@ -99,11 +99,7 @@ def parse(arguments=None):
     parser.add_argument("--aggregate", type=int, choices=(1, 2, 4), default=2)
     parser.add_argument("--device", choices=("gpu", "cpu"), default="gpu")
     parser.add_argument("--json", type=Path, help="where the rows are written")
-    return parser.parse_args(arguments)
-
-
-def main(arguments=None) -> int:
-    args = parse(arguments)
+    args = parser.parse_args()
     print("| film | noise | guide | still | mean | worst frame | 99 % |\n|---|---|---|---|---|---|---|")
     rows = run(args)
     write_rows(args.json, rows)

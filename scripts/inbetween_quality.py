@@ -165,7 +165,7 @@ def picture(path: Path) -> None:
 PARTS = {"films": films, "scenes": scenes}
 
 
-def parse(arguments=None):
+def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     add = parser.add_argument
     add("--parts", type=listed(str), default=list(PARTS), help=",".join(PARTS))
@@ -176,11 +176,7 @@ def parse(arguments=None):
     add("--start", type=int, default=1, help="first frame at 30 fps (%(default)s)")
     add("--docs", action="store_true", help="renew the manual's picture, docs/smooth.jpg, and measure nothing")
     add("--json", type=Path, help="where the rows are written")
-    return parser.parse_args(arguments)
-
-
-def main(arguments=None) -> int:
-    args = parse(arguments)
+    args = parser.parse_args()
     if args.docs:
         picture(ROOT / "docs" / "smooth.jpg")
         return 0

@@ -348,8 +348,7 @@ def camera(scene: Scene) -> list[dict]:
     """The keys of a camera that pans: where what it sees lies."""
     if not scene.pan:
         return []
-    places = [-scene.pan * (frame - SHOWN) / WIDE for frame in range(COUNT)]
-    return [{"frame": frame + 1, "location": [x, 0]} for frame, x in enumerate(places)]
+    return [{"frame": frame + 1, "location": [-scene.pan * (frame - SHOWN) / WIDE, 0]} for frame in range(COUNT)]
 
 
 def shown(source: Memory, given: Effect, files: dict) -> np.ndarray:
@@ -384,16 +383,14 @@ def decibels(picture: np.ndarray, truth: np.ndarray, where: np.ndarray) -> float
     return psnr(np.rint(codes(picture))[where], codes(truth)[where])
 
 
-def table(rows: list[dict]) -> str:
-    lines = [
-        "| scene | picture | way | ring, dB | not exposed, dB | same bits elsewhere |",
-        "|---|---|---|--:|--:|---|",
-    ]
-    for row in rows:
-        plate = "" if row["plate"] is None else f"{row['plate']:.1f}"
-        same = {None: "", True: "yes", False: "NO"}[row.get("same bits elsewhere")]
-        lines.append(f"| {row['scene']} | {row['picture']} | {row['way']} | {row['ring']:.1f} | {plate} | {same} |")
-    return "\n".join(lines)
+HEAD = """| scene | picture | way | ring, dB | not exposed, dB | same bits elsewhere |
+|---|---|---|--:|--:|---|"""
+
+
+def line(row: dict) -> str:
+    plate = "" if row["plate"] is None else f"{row['plate']:.1f}"
+    same = {None: "", True: "yes", False: "NO"}[row.get("same bits elsewhere")]
+    return f"| {row['scene']} | {row['picture']} | {row['way']} | {row['ring']:.1f} | {plate} | {same} |"
 
 
 def main() -> int:
@@ -404,12 +401,13 @@ def main() -> int:
     parser.add_argument("--samples", type=int, default=32, help="of each pixel")
     arguments = parser.parse_args()
     size, rows = tuple(map(int, arguments.size.split("x"))), []
+    print(HEAD)
     for number in range(len(SCENES) + 1):
         folder = arguments.output / str(number)
         is_tracked = number == len(SCENES)
         case = tracked_board(folder) if is_tracked else render(SCENES[number], folder, size, arguments.samples)
         found = measure(case, arguments.output)
-        print("\n".join(table(found).splitlines()[0 if not number else 2 :]), flush=True)
+        print(*map(line, found), sep="\n", flush=True)
         rows += found
     write_rows(arguments.json, rows)
     return 0

@@ -51,7 +51,7 @@ def run(args) -> list[dict]:
     return rows
 
 
-def parse(arguments=None):
+def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     add = parser.add_argument
     add("films", type=Path, nargs="*", default=FILMS)
@@ -62,11 +62,7 @@ def parse(arguments=None):
     add("--shutters", type=int, choices=range(2, 9), default=4)
     add("--frames", type=int, default=12, help="pictures of each film")
     add("--device", choices=("gpu", "cpu"), default="gpu")
-    return parser.parse_args(arguments)
-
-
-def main(arguments=None) -> int:
-    args = parse(arguments)
+    args = parser.parse_args()
     print("| film | bars | shutters | window | mean | worst |\n|---|---|---|---|---|---|")
     try:
         rows = run(args)

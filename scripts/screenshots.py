@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 from OpenImageIO import ROI, UINT8, ImageBuf, ImageBufAlgo
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "blender"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "window"))
 import driver
 import story
@@ -22,11 +23,11 @@ BODY = [(0.07, 0.80), (0.13, 0.66), (0.22, 0.62), (0.24, 0.45), (0.29, 0.33), (0
 def areas_arranged():
     """A large preview over a low timeline: this window is small."""
     for kind in ("FILE_BROWSER", "PROPERTIES"):
-        with bpy.context.temp_override(window=bpy.context.window_manager.windows[0], area=driver.area_of(kind)):
+        with bpy.context.temp_override(window=driver.windows()[0], area=driver.area_of(kind)):
             bpy.ops.screen.area_close()
         yield 0.5
     area = driver.area_of("SEQUENCE_EDITOR", "SEQUENCER")
-    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
+    with bpy.context.temp_override(window=driver.windows()[0]):
         edge = {"x": area.x + area.width // 2, "y": area.y + area.height}
         bpy.ops.screen.area_move(**edge, delta=TIMELINE - area.height)
     yield 0.5
@@ -36,7 +37,7 @@ def areas_arranged():
 
 def on_picture(points):
     """Points of the picture in pixels of the preview's region."""
-    render, view = story.edit().render, story.preview().view2d
+    render, view = driver.edit().render, story.preview().view2d
     width, height = render.resolution_x, render.resolution_y
     return [view.view_to_region((x - 0.5) * width, (y - 0.5) * height, clip=False) for x, y in points]
 
@@ -111,7 +112,7 @@ def dope_sheet_shown():
     area.ui_type = "DOPESHEET"
     yield 1.0
     where = {"area": area, "region": driver.region_of(area, "CHANNELS")}
-    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0], **where):
+    with bpy.context.temp_override(window=driver.windows()[0], **where):
         bpy.ops.anim.channels_expand()
     yield 0.5
 
@@ -124,7 +125,7 @@ def scrolled_down(region):
 
 def baked():
     """The effect is baked, looked at and brought back."""
-    strips = story.edit().sequence_editor.strips_all
+    strips = driver.edit().sequence_editor.strips_all
     ends = {strip.name: strip.right_handle for strip in strips}
     for strip in strips:
         strip.right_handle = FRAME + 24
@@ -156,7 +157,7 @@ def pictures():
     yield from areas_arranged()
     yield from story.movie_added()
     yield from story.effect_added()
-    story.edit().frame_set(FRAME)
+    driver.edit().frame_set(FRAME)
     story.effect().window = WINDOW
     for view, show in (("SEQUENCER", bpy.ops.sequencer.view_all), ("PREVIEW", bpy.ops.sequencer.view_all_preview)):
         with driver.override(view):
@@ -184,7 +185,7 @@ def pictures():
     yield from story.keyed()
     story.effect().active_shutter = 1
     yield from region_keyed()
-    story.edit().frame_set(LATER)
+    driver.edit().frame_set(LATER)
     story.effect().active_shutter = 0
     yield from preset("ANGLE_360")
     yield from story.keyed()
@@ -192,7 +193,7 @@ def pictures():
     yield from region_moved((-0.02, -0.07))
     yield from region_keyed()
     story.effect().active_shutter = 0
-    story.edit().frame_set(FRAME)
+    driver.edit().frame_set(FRAME)
     yield from dope_sheet_shown()
     yield from picture("keys", (0, 560, 1230, 388))
     published("keys")

@@ -8,7 +8,7 @@ import planted
 import pytest
 
 SCRIPTS = Path(__file__).parents[1] / "scripts"
-INPUTS = {"recipes": 8, "media": 20}
+INPUTS = {"recipes": 5, "media": 12}
 
 
 @pytest.fixture

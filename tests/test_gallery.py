@@ -78,7 +78,7 @@ def test_an_item_from_end_to_end(tmp_path, monkeypatch):
     frames = bunny.FRAME, bunny.FRAME + 1
     assert make(dataclasses.replace(bunny.ITEM, frames=frames), Path(tmp_path.name), docs=False) == 0
     assert {path.name for path in tmp_path.iterdir()} == {f"bunny.{end}" for end in ("blend", "json", "mp4", "png")}
-    shot = Shot(bunny.footage(tmp_path), tmp_path / "bunny.json", tmp_path / "bunny.mp4", frames[0])
+    shot = Shot(bunny.ITEM.footage(tmp_path), tmp_path / "bunny.json", tmp_path / "bunny.mp4", frames[0])
     difference = np.abs(shot.result(bunny.FRAME) - shot.source(bunny.FRAME)).mean(axis=2)
     assert difference[HEAD].mean() < 0.02
     assert difference[MEADOW].mean() < 0.02
@@ -102,7 +102,7 @@ def angles_of_time(height, width):
 @pytest.mark.parametrize(("name", "times"), [("time_map", rows_of_time), ("time_map-angle", angles_of_time)])
 def test_time_maps_are_frames_put_together(name, times):
     """A pixel whose time is a whole frame's is that frame's to the bit, and others mix the two frames around."""
-    source, effect = open_source(time_map.footage(None)), recipe_file.load(HERE / f"{name}.json")
+    source, effect = open_source(time_map.ITEM.footage(None)), recipe_file.load(HERE / f"{name}.json")
     height, width, shown = source.height, source.width, time_map.FRAME - 1
     renderer = Renderer(open_compositor(), source, MatteValues(width, height))
     request = Request(shown, effect.for_picture(width / height).at(time_map.FRAME))

@@ -9,6 +9,8 @@ import subprocess
 import sys
 import traceback
 import warnings
+from functools import partial
+from importlib import import_module
 from pathlib import Path
 
 import bpy
@@ -20,7 +22,8 @@ import thread_guard
 for deprecated in (DeprecationWarning, PendingDeprecationWarning):
     warnings.simplefilter("error", deprecated)
 
-PREVIEWS = "bl_ext.user_default.virtual_shutter.shutter_addon.blender.rendering.previews"
+NAME = "bl_ext.user_default.virtual_shutter"
+PREVIEWS = f"{NAME}.shutter_addon.blender.rendering.previews"
 OUT = Path(os.environ.get("SHUTTER_PICTURES", "/tmp/shutter-window"))
 _QUICK = "-define", "png:compression-level=1"  # a third of the time, for a tenth more bytes
 STEP = 0.25  # seconds that Blender gets for events and redraws
@@ -28,22 +31,47 @@ _seen = []
 _texts = 0  # characters of the last text in the status bar
 
 
+rendering = partial(bpy.app.is_job_running, "RENDER")
+
+
+def part(name):
+    """A module of the extension that is enabled now."""
+    return import_module(f"{NAME}.shutter_addon.{name}")
+
+
+def windows():
+    return bpy.context.window_manager.windows
+
+
+def edit():
+    """Undo makes a new scene of it: never keep it."""
+    return bpy.data.scenes["Edit"]
+
+
 def enable():
     """Enables the extension, linked into the user folder that the caller made."""
     import addon_utils
 
-    module = addon_utils.enable("bl_ext.user_default.virtual_shutter", default_set=True)
+    module = addon_utils.enable(NAME, default_set=True)
     assert module, "the extension could not be enabled"
 
 
 def video_editing_opened():
     """A new file of Blender's template for it, with the extension, which a new file disables; generator: yield from
-    it."""
+    it. Its edit renders PNG pictures that can be compared with the source's."""
     bpy.context.preferences.view.render_display_type = "NONE"  # its window would cover the other
     enable()
     bpy.ops.wm.read_homefile(app_template="Video_Editing")
     yield 1.0
     enable()
+    bpy.context.preferences.view.smooth_view = 0  # a view that still moves is nowhere
+    scene = windows()[0].workspace.sequencer_scene
+    scene.name = "Edit"
+    scene.sequence_editor_create()
+    scene.view_settings.view_transform = "Standard"
+    scene.render.dither_intensity = 0
+    scene.render.image_settings.media_type = "IMAGE"
+    scene.render.image_settings.file_format = "PNG"
 
 
 def composing(previews):
@@ -130,14 +158,14 @@ def shot_when_shown(name):
 def _tell_status():
     global _texts
     _texts = _texts % 20 + 1
-    window = bpy.context.window_manager.windows[0]
+    window = windows()[0]
     with bpy.context.temp_override(window=window):
         window.workspace.status_text_set("#" * _texts)
 
 
 def _status_bar():
     """The pixels of its left end."""
-    height = bpy.context.window_manager.windows[0].height
+    height = windows()[0].height
     box = f"300x16+0+{height - 18}"
     return subprocess.run(["import", "-window", "root", "-crop", box, "rgb:-"], check=True, capture_output=True).stdout
 
@@ -146,9 +174,15 @@ def xdotool(*arguments):
     subprocess.run(["xdotool", *map(str, arguments)], check=True)
 
 
+def pen_left():
+    """The tool of before a stroke."""
+    with override("PREVIEW"):
+        bpy.ops.wm.tool_set_by_id(name="builtin.select_box")
+
+
 def area_of(kind, view=None):
     """The first area of a kind; view: of a sequencer, its view type."""
-    for area in bpy.context.window_manager.windows[0].screen.areas:
+    for area in windows()[0].screen.areas:
         if area.type == kind and (view is None or area.spaces.active.view_type == view):
             return area
     raise LookupError(f"no {kind} {view or ''}")
@@ -162,12 +196,12 @@ def override(view):
     """Operators run as in the sequencer's area of that view type."""
     area = area_of("SEQUENCE_EDITOR", view)
     region = region_of(area, "PREVIEW" if view == "PREVIEW" else "WINDOW")
-    return bpy.context.temp_override(window=bpy.context.window_manager.windows[0], area=area, region=region)
+    return bpy.context.temp_override(window=windows()[0], area=area, region=region)
 
 
 def screen(region, x, y):
     """Screen coordinates, top row 0, of a point in a region, whose rows go up."""
-    height = bpy.context.window_manager.windows[0].height
+    height = windows()[0].height
     return round(region.x + x), round(height - 1 - region.y - y)
 
 
@@ -177,7 +211,7 @@ def move(region, x, y):
 
 def edge_moved(area, right: int, up: int):
     """Moves an area's right or upper edge by pixels."""
-    window = bpy.context.window_manager.windows[0]
+    window = windows()[0]
     x = area.x + (area.width if right else area.width // 2)
     y = area.y + (area.height if up else area.height // 2)
     xdotool("mousemove", x, window.height - 1 - y)  # where no region is active
@@ -210,6 +244,32 @@ def drag(region, points, hold=()):
     yield
 
 
+def strip_added(name, first, channel=1, start=1):
+    """An image strip, the active one, of all pictures beside the first."""
+    strip = edit().sequence_editor.strips.new_image(name, str(first), channel, start)
+    for path in sorted(first.parent.iterdir())[1:]:
+        strip.elements.append(path.name)
+    edit().sequence_editor.active_strip = strip
+    return strip
+
+
+def render(path, **options):
+    """Begins to render the edit to a path below OUT, as a job of the window."""
+    edit().render.filepath = f"{OUT}/{path}"
+    with bpy.context.temp_override(window=windows()[0], scene=edit()):
+        bpy.ops.render.render("INVOKE_DEFAULT", **options)
+
+
+def film(folder, first, last):
+    """Begins to render frames into a folder."""
+    edit().frame_start, edit().frame_end = first, last
+    render(f"{folder}/", animation=True)
+
+
+def render_ended(seconds=200):
+    return until(lambda: not rendering(), "the render ends", seconds)
+
+
 def until(condition, what, seconds=10, again=None, wait=STEP):
     """Waits for a condition; generator: yield from it. again: called now and every two seconds until it comes about.
     wait: seconds from one look to the next."""
@@ -230,8 +290,8 @@ def text(words):
     xdotool("type", "--delay", 40, words)
 
 
-def effect_added(edit):
-    """Shutter in the timeline's Add menu, found by typing; generator: yield from it. edit: gives the edit's scene."""
+def effect_added():
+    """Shutter in the timeline's Add menu, found by typing; generator: yield from it."""
     region = region_of(area_of("SEQUENCE_EDITOR", "SEQUENCER"))
     move(region, region.width / 2, region.height / 2)
     yield

@@ -1,14 +1,6 @@
 """What is above the fold of the Shutter tab, in Blender's own layout, at both scales of the interface and in both
 languages: every place that is seen is pointed at. Run inside Blender, by test_window.py."""
 
-# ruff: noqa: E402 (Blender finds the helpers once it knows their folder)
-import os
-import sys
-from pathlib import Path
-
-sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "blender")]
-sys.path.append(os.environ["SHUTTER_PACKAGES"])
-
 import bpy
 import driver
 import numpy as np
@@ -41,7 +33,7 @@ def opened():
     yield from story.opened()
     first = write_frames(FILM, [frame(number) for number in range(COUNT)])
     yield from story.pictures_added(first, SIZE)
-    story.edit().frame_set(3)
+    driver.edit().frame_set(3)
     story.effect().inbetween = "1"
     bpy.ops.ed.undo_push(message="Start")
     with driver.override("PREVIEW"):
@@ -51,8 +43,7 @@ def opened():
 
 def note():
     """How far it goes from one frame of the exposure to the next, in pixels."""
-    strobing = sys.modules["bl_ext.user_default.virtual_shutter.shutter_addon.blender.rendering.strobing"]
-    return strobing.last(story.effect())
+    return driver.part("blender.rendering.strobing").last(story.effect())
 
 
 def pointed_at():
@@ -70,8 +61,8 @@ def buttons():
     """The operators of all buttons that are seen in the tab, and how far down; generator: yield from it."""
     found, sidebar = {}, story.sidebar()
     unit = bpy.context.preferences.system.ui_scale
-    for down in range(int(10 * unit), sidebar.height, int(9 * unit)):
-        for across in (0.15, 0.45, 0.7):
+    for down in range(int(10 * unit), sidebar.height, int(14 * unit)):
+        for across in (0.15, 0.5):
             driver.move(sidebar, sidebar.width * across, sidebar.height - down)
             yield 0.06
             if (button := pointed_at()) and button not in found:
@@ -87,15 +78,15 @@ def drawn():
     w, h = region.width, region.height
     yield from driver.drag(region, [(w * x, h * 0.6) for x in (0.4, 0.45, 0.5)])
     assert len(story.effect().regions) == 1
-    with driver.override("PREVIEW"):
-        bpy.ops.wm.tool_set_by_id(name="builtin.select_box")
+    driver.pen_left()
     yield
 
 
-def told():
+def steps():
     yield from opened()
+    story.effect().edge_aware = 0.0  # or Draw would set it, which takes a software renderer long
     yield from drawn()
-    source = story.edit().sequence_editor.strips_all["Film"]
+    source = driver.edit().sequence_editor.strips_all["Film"]
     source.transform.rotation, source.crop.max_x, source.color_saturation, source.use_flip_x = 0.01, 2, 0.9, True
     for language, scale in LAYOUTS:
         bpy.context.preferences.view.language = language
@@ -137,7 +128,3 @@ def shutter_chosen(sidebar, down):
     yield from driver.until(lambda: story.effect().regions[0].shutter == "Long", "the region has another shutter")
     story.effect().regions[0].shutter = "Sharp"
     story.effect().active_shutter = 1
-
-
-if __name__ == "__main__":
-    driver.play(told)

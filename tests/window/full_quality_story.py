@@ -1,11 +1,8 @@
 """One look at a frame as it will be rendered, by *Full Quality*: and back by a second click, by another
 frame, by a change. Run inside Blender, by test_window.py."""
 
-# ruff: noqa: E402 (Blender finds the helpers once it knows their folder)
 import sys
-from pathlib import Path
-
-sys.path[:0] = [str(Path(__file__).parent)]
+from functools import partial
 
 import bpy
 import driver
@@ -13,11 +10,10 @@ import preview_sizes_story as sizes
 import story
 
 FRAME = 50
-_part = "bl_ext.user_default.virtual_shutter.shutter_addon.blender.{}".format
 
 
 def interface(name):
-    return sys.modules[_part(f"interface.{name}")]
+    return driver.part(f"blender.interface.{name}")
 
 
 def clicked():
@@ -31,23 +27,24 @@ def view():
     return [rows, *centre]
 
 
-def shown(name):
-    yield 1.0
-    yield from driver.shot_when_shown(name)
+def middle():
+    """The picture's, on the screen."""
     region = story.preview()
-    x, y = region.view2d.view_to_region(0, 0, clip=False)  # of the picture's middle
-    left, bottom = driver.screen(region, x, y)
-    zoom = view()
-    driver.saw(step=name, crop=story.crop(), composed=sizes.composed(), view=zoom, middle=[left, bottom + 1])
+    left, bottom = driver.screen(region, *region.view2d.view_to_region(0, 0, clip=False))
+    return [left, bottom + 1]
+
+
+shown = partial(story.seen, composed=sizes.composed, view=view, middle=middle)
 
 
 def prepared():
-    yield from story.opened()
+    yield from story.opened(320, 180)
     yield from story.movie_added()
-    story.edit().frame_set(FRAME)
+    driver.edit().frame_set(FRAME)
     yield from sizes.effect_added()
-    story.effect().edge_aware = 1.0
+    story.effect().edge_aware, story.effect().aggregate = 1.0, "4"
     space = sizes.space()
+    space.proxy_render_size = "PROXY_50"
     space.show_gizmo = space.show_overlays = True
     for layer in story.effect().scene.annotation.layers:
         layer.annotation_hide = True
@@ -57,7 +54,7 @@ def prepared():
 def looked():
     yield from shown("before")
     yield from clicked()
-    full = [[1280, 720]]
+    full = [[320, 180]]
     yield from driver.until(lambda: sizes.composed() == full, "it is composed in full", 20)
     yield from shown("full")
     yield from clicked()
@@ -65,10 +62,10 @@ def looked():
     yield from clicked()
     yield from driver.until(lambda: sizes.composed() == full, "it is composed in full", 20)
     driver.key("Right")
-    yield from driver.until(lambda: story.edit().frame_current == FRAME + 1, "the next frame is shown")
+    yield from driver.until(lambda: driver.edit().frame_current == FRAME + 1, "the next frame is shown")
     yield from shown("next")
     driver.key("Left")
-    yield from driver.until(lambda: story.edit().frame_current == FRAME, "the frame is shown")
+    yield from driver.until(lambda: driver.edit().frame_current == FRAME, "the frame is shown")
     yield from clicked()
     yield from driver.until(lambda: sizes.composed() == full, "it is composed in full", 20)
     story.effect().edge_aware = 0.0
@@ -86,7 +83,7 @@ def composed_late():
     driver.PREVIEWS = ""  # whose pictures it waits for
     for step, frame in (("late_drawn", FRAME + 20), ("late_engine", FRAME + 10)):
         previews._SLICE = 0.0  # nothing is done in time
-        story.edit().frame_set(frame)
+        driver.edit().frame_set(frame)
         said.clear()
         yield from driver.until(lambda: late(said), "it says that it composes")
         if step == "late_engine":
@@ -98,13 +95,13 @@ def composed_late():
         driver.shot(step)
         driver.move(story.preview(), 50, 50)
         driver.key("Right")
-        yield from driver.until(lambda frame=frame: story.edit().frame_current == frame + 1, "the playhead moves")
+        yield from driver.until(lambda frame=frame: driver.edit().frame_current == frame + 1, "the playhead moves")
         yield from driver.until(lambda: late(said), "it says so of this frame as well")
         previews._SLICE = previews.looking.slices.seconds = first  # as it was
         yield from driver.until(lambda: not driver.composing(previews), "the picture comes", 60)
         yield from driver.until(lambda: not late(said), "nothing is late")
     driver.PREVIEWS, preview.draw_notes = name, drawn  # as they were
-    story.edit().frame_set(FRAME)
+    driver.edit().frame_set(FRAME)
 
 
 def late(said):
@@ -112,12 +109,8 @@ def late(said):
     return bool(said) and any(sentence.startswith("Composing") for sentence in said[-1])
 
 
-def told():
+def steps():
     yield from prepared()
     yield from composed_late()
     yield from looked()
     yield from story.rendered()
-
-
-if __name__ == "__main__":
-    driver.play(told)

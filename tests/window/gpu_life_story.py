@@ -2,25 +2,15 @@
 operator or a handler does then, Blender lives, and shows the same picture afterwards. Run inside Blender, by
 test_rendered.py. SHUTTER_FOOTAGE has the source, SHUTTER_RECIPE the effect."""
 
-# ruff: noqa: E402 (Blender finds the helpers once it knows their folders)
 import os
-import sys
-from pathlib import Path
-
-sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "blender")]
 
 import addon_utils
 import bpy
 import gpu_guard
-import traces
-from driver import OUT, enable, override, play, quit_blender, saw, shot_when_shown, until
-from given_edit import edit, opened
+from driver import NAME, OUT, edit, enable, override, quit_blender, rendering, saw, shot_when_shown, until, windows
+from given_edit import opened
 
 FILE = str(OUT / "edit.blend")
-
-
-def windows():
-    return bpy.context.window_manager.windows
 
 
 def effect_strip():
@@ -42,7 +32,7 @@ def render_window():
     bpy.context.preferences.view.render_display_type = "WINDOW"
     with bpy.context.temp_override(window=windows()[0], scene=edit()):
         bpy.ops.render.render("INVOKE_DEFAULT")
-    yield from until(lambda: len(windows()) == 2 and not bpy.app.is_job_running("RENDER"), "the frame is rendered", 60)
+    yield from until(lambda: len(windows()) == 2 and not rendering(), "the frame is rendered", 60)
     yield 0.5
     bpy.context.preferences.view.render_display_type = "NONE"
     with bpy.context.temp_override(window=windows()[-1]):
@@ -65,7 +55,7 @@ def home_read():
 
 
 def disabled():
-    addon_utils.disable(traces.NAME)
+    addon_utils.disable(NAME)
 
 
 def strip_removed():
@@ -109,7 +99,7 @@ def still_rendered():
 
 def device_changed():
     """And the memory that textures may take: both sessions begin anew."""
-    preferences = bpy.context.preferences.addons[traces.NAME].preferences
+    preferences = bpy.context.preferences.addons[NAME].preferences
     preferences.gpu_memory = 700 if preferences.gpu_memory != 700 else 800
     preferences.device = "CPU"
     still_rendered()
@@ -118,7 +108,7 @@ def device_changed():
 
 def refused_on_blenders_gpu():
     """The one render that has no other: it says so."""
-    preferences = bpy.context.preferences.addons[traces.NAME].preferences
+    preferences = bpy.context.preferences.addons[NAME].preferences
     preferences.device = "BLENDER"
     edit().render.filepath = str(OUT / "refused.png")
     bpy.ops.render.render(write_still=True, scene="Edit")
@@ -180,7 +170,7 @@ def by_handler(act):
 
 def again():
     """The edit as it was saved, shown by the live preview on Blender's GPU; generator: yield from it."""
-    if not addon_utils.check(traces.NAME)[1]:
+    if not addon_utils.check(NAME)[1]:
         enable()
     bpy.ops.wm.open_mainfile(filepath=FILE)
     yield 0.6
@@ -210,7 +200,7 @@ PARTS = {
 }
 
 
-def story():
+def steps():
     yield from opened()
     bpy.utils.register_class(SHUTTER_TEST_OT_act)
     bpy.ops.wm.save_as_mainfile(filepath=FILE)
@@ -230,6 +220,3 @@ def story():
     quit_blender()
     yield 30
     raise AssertionError("Blender did not quit")
-
-
-play(story)

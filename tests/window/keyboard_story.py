@@ -1,12 +1,7 @@
 """An effect without a mouse, by Blender's search and numbers; the pointer lies over the preview and is not
 moved. Run inside Blender, by test_window.py."""
 
-import sys
-from pathlib import Path
-
 import bpy
-
-sys.path.insert(0, str(Path(__file__).parent))
 import driver
 import story
 
@@ -39,19 +34,15 @@ def typed(*words):
     driver.key("Return")
 
 
-def told():
-    yield from story.opened()
+def steps():
+    yield from story.opened(320, 180)
     yield from story.movie_added()
-    story.edit().sequence_editor.active_strip = story.edit().sequence_editor.strips[0]
+    driver.edit().sequence_editor.active_strip = driver.edit().sequence_editor.strips[0]
     region = story.preview()
     driver.move(region, region.width / 2, region.height / 2)
     yield 0.5
-    yield from found("add shutter strip", lambda: len(story.edit().virtual_shutter.effects))
+    yield from found("add shutter strip", lambda: len(driver.edit().virtual_shutter.effects))
     yield 0.5
     yield from found("set bar weight", lambda: True)
     yield from typed("0.25", "3")
     yield from driver.until(lambda: story.effect().shutters[1].bars[2].weight == 0.25, "the bar is set")
-
-
-if __name__ == "__main__":
-    driver.play(told)

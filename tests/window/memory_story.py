@@ -3,31 +3,19 @@ the film kept freed; with the film on moderngl's device, then on Blender's. Run 
 
 SHUTTER_FOOTAGE has the first of the source's frames, SHUTTER_RECIPE the effect, SHUTTER_MEGABYTES the limit."""
 
-# ruff: noqa: E402 (Blender finds the helpers once it knows their folders)
 import os
-import sys
 from contextlib import suppress
-from functools import partial
-from pathlib import Path
-
-sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "blender")]
 
 import bpy
-import traces
-from driver import OUT, area_of, play, saw, until
-from given_edit import edit, opened
+from driver import NAME, area_of, edit, film, part, rendering, saw, until
+from given_edit import opened
 
 FRAMES = 4
 MEGABYTES = int(os.environ["SHUTTER_MEGABYTES"])
-rendering = partial(bpy.app.is_job_running, "RENDER")
-
-
-def part(name):
-    return sys.modules[f"{traces.NAME}.shutter_addon.blender.rendering.{name}"]
 
 
 def sessions():
-    return part("sessions")
+    return part("blender.rendering.sessions")
 
 
 def held(which):
@@ -52,7 +40,7 @@ def shown():
 
 def told_in_the_preview():
     """What a preview says of a GPU that has no room for its frames."""
-    preview = sys.modules[f"{traces.NAME}.shutter_addon.blender.interface.preview"]
+    preview = part("blender.interface.preview")
     said, wrapped = [], preview.drawing.wrapped
 
     def noted(words, *room):
@@ -66,10 +54,9 @@ def told_in_the_preview():
     saw(said=said)
 
 
-def story():
+def steps():
     yield from opened()
-    edit().frame_start, edit().frame_end = 1, FRAMES
-    preferences = bpy.context.preferences.addons[traces.NAME].preferences
+    preferences = bpy.context.preferences.addons[NAME].preferences
     preferences.gpu_memory = MEGABYTES
     sessions().settle()
     window, offscreen = sessions().WINDOW, sessions().OFFSCREEN
@@ -77,10 +64,8 @@ def story():
         preferences.device = device
         yield from shown()
         before = held(window)
-        edit().render.filepath = f"{OUT / device}/"
-        with bpy.context.temp_override(window=bpy.context.window_manager.windows[0], scene=edit()):
-            bpy.ops.render.render("INVOKE_DEFAULT", animation=True)
-        budget, most, found = part("render_settings").memory(), 0, {}
+        film(device, 1, FRAMES)
+        budget, most, found = part("blender.rendering.render_settings").memory(), 0, {}
         while rendering():
             most = max(most, budget.used)
             with suppress(ValueError, RuntimeError):  # the film's thread takes its renderer out for a moment
@@ -96,6 +81,3 @@ def story():
     preferences.gpu_memory = MEGABYTES // 4
     sessions().settle()
     yield from told_in_the_preview()
-
-
-play(story)

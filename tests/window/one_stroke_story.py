@@ -1,19 +1,11 @@
 """One stroke is enough: drawn, tracked, mended where it is wrong, and rendered, by mouse. Run inside Blender, by
 test_tracked.py."""
 
-# ruff: noqa: E402 (Blender finds the helpers once it knows their folder)
-import os
-import sys
-from pathlib import Path
-
-sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "blender")]
-sys.path.append(os.environ["SHUTTER_PACKAGES"])  # OpenCV, which a Blender of a distribution need not have
-
 import bpy
 import driver
 import numpy as np
 import story
-import traces
+from driver import part
 
 # Of the footage's frame 70, in fractions of the picture: down a woman's back.
 FRAME, STROKE = 70, ((0.462, 0.65), (0.465, 0.62), (0.467, 0.59), (0.468, 0.565))
@@ -23,17 +15,13 @@ RENDERED = range(65, 86, 20)
 FOLLOW_EDGES, TRACK = 355, 193  # where they stand in the sidebar, in pixels below its upper edge
 
 
-def part(name):
-    return sys.modules[f"{traces.NAME}.shutter_addon.{name}"]
-
-
 def region():
     return story.effect().regions[0]
 
 
 def on_preview(x, y):
     """Pixels of the preview's region, of a point in fractions of the picture."""
-    view, render = story.preview().view2d, story.edit().render
+    view, render = story.preview().view2d, driver.edit().render
     return view.view_to_region((x - 0.5) * render.resolution_x, (y - 0.5) * render.resolution_y, clip=False)
 
 
@@ -41,7 +29,7 @@ def kinds():
     """Of the keys of the location by frame."""
     from bpy_extras.anim_utils import action_get_channelbag_for_slot as bag_of
 
-    data = story.edit().animation_data
+    data = driver.edit().animation_data
     if data is None:
         return {}
     curve = bag_of(data.action, data.action_slot).fcurves.find("virtual_shutter.effects[0].regions[0].location")
@@ -51,13 +39,7 @@ def kinds():
 def roomier():
     """A low timeline leaves room for the panel."""
     area = driver.area_of("SEQUENCE_EDITOR", "SEQUENCER")
-    window = bpy.context.window_manager.windows[0]
-    edge = {"x": area.x + area.width // 2, "y": area.y + area.height}
-    driver.xdotool("mousemove", edge["x"], window.height - 1 - edge["y"])  # where no region is active
-    yield 0.5
-    with bpy.context.temp_override(window=window):
-        bpy.ops.screen.area_move(**edge, delta=200 - area.height)
-    yield 0.5
+    yield from driver.edge_moved(area, 0, 200 - area.height)
 
 
 def drawn():
@@ -110,7 +92,7 @@ def edges_followed():
 
 def mended():
     """The handle is dragged at a frame, which keys the region there by itself; tracking goes through that key."""
-    story.edit().frame_set(MENDED)
+    driver.edit().frame_set(MENDED)
     yield 1.0
     with driver.override("PREVIEW"):
         x, y = part("blender.interface.region_gizmo").place(bpy.context).centre
@@ -126,7 +108,7 @@ def mended():
     yield from ended()
     assert [frame for frame, kind in kinds().items() if kind == "KEYFRAME"] == [FRAME, MENDED]
     driver.saw(mended=kinds())
-    yield from driver.until(lambda: story.edit().frame_current == MENDED, "the frame is where it was")
+    yield from driver.until(lambda: driver.edit().frame_current == MENDED, "the frame is where it was")
     yield 1.0
     driver.shot("3_tracked_again")
     after = story.curves()
@@ -140,20 +122,20 @@ def mended():
 
 def escaped():
     """What is tracked until Esc stays."""
-    story.edit().frame_set(FRAME)
+    driver.edit().frame_set(FRAME)
     yield 1.0
     yield from tracked()
-    yield from driver.until(lambda: story.edit().frame_current != FRAME, "the preview goes along", 60, wait=0.02)
+    yield from driver.until(lambda: driver.edit().frame_current != FRAME, "the preview goes along", 60, wait=0.02)
     driver.shot("4_escaping")
     driver.key("Escape")
     yield from ended()
-    driver.saw(escaped=kinds(), frame=story.edit().frame_current)
+    driver.saw(escaped=kinds(), frame=driver.edit().frame_current)
 
 
 def redrawn():
     """At another frame of what is tracked, a stroke lies where it is drawn; the pen is left, and one drag of the handle
     moves it. Around what is sharp stands a line."""
-    story.edit().frame_set(REDRAWN)
+    driver.edit().frame_set(REDRAWN)
     yield 1.0
     moved, place = np.array(stroke_at(REDRAWN)), part("blender.interface.region_gizmo").place
     points = [np.add(moved, (0.1, y)) for y in (0.05, 0.02, -0.01, -0.04)]
@@ -181,18 +163,10 @@ def redrawn():
 
 
 def rendered(frames=RENDERED):
-    edit = story.edit()
-    edit.render.image_settings.media_type = "IMAGE"
-    edit.render.image_settings.file_format = "PNG"
-    edit.render.dither_intensity = 0
-    edit.render.filepath = str(driver.OUT / "final_")
+    edit = driver.edit()
     edit.frame_start, edit.frame_end, edit.frame_step = frames.start, frames.stop - 1, frames.step
-    done = []
-    # The preview's pictures of the effect are renders of its own scene.
-    bpy.app.handlers.render_complete.append(lambda scene, *_: scene.name == "Edit" and done.append(True))
-    with driver.override("PREVIEW"):
-        bpy.ops.render.render("INVOKE_DEFAULT", animation=True)
-    yield from driver.until(lambda: done, "the render ends", 200)
+    driver.render("final_", animation=True)
+    yield from driver.render_ended()
     for frame in frames:
         driver.saw(rendered=frame, stroke=stroke_at(frame) if story.effect().regions else None)
 
@@ -215,16 +189,16 @@ def stroke_at(frame):
     return points.mean(axis=0).tolist()
 
 
-def begun(shown=SHOWN, draw=drawn):
+def begun(shown=SHOWN, draw=drawn, size=(768, 576)):
     """The stroke is drawn, and the sidebar shows its buttons. shown: the frames that the strip is trimmed to; draw: a
-    generator, as `drawn`, of what is drawn in its place."""
-    yield from story.opened()
-    story.edit().render.resolution_x, story.edit().render.resolution_y, story.edit().frame_end = 768, 576, 100
+    generator, as `drawn`, of what is drawn in its place; size: of the footage."""
+    yield from story.opened(*size)
+    driver.edit().frame_end = 100
     yield from roomier()
     yield from story.movie_added()
-    movie = story.edit().sequence_editor.strips_all[0]
+    movie = driver.edit().sequence_editor.strips_all[0]
     movie.left_handle, movie.right_handle = shown.start, shown.stop
-    story.edit().frame_set(FRAME)
+    driver.edit().frame_set(FRAME)
     yield from story.effect_added()
     story.effect().inbetween = "1"  # moments take a software renderer long
     story.effect().active_shutter = 1
@@ -232,19 +206,15 @@ def begun(shown=SHOWN, draw=drawn):
     driver.shot("1_stroke")
 
 
-def told():
+def steps():
     yield from begun()
     yield from tracked()
     yield from ended()
     yield 1.0
     driver.shot("2_tracked")
-    driver.saw(tracked=kinds(), frame=story.edit().frame_current)
+    driver.saw(tracked=kinds(), frame=driver.edit().frame_current)
     yield from mended()
     yield from escaped()
     yield from edges_followed()
     yield from rendered()
     yield from redrawn()
-
-
-if __name__ == "__main__":
-    driver.play(told)

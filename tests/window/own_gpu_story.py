@@ -2,41 +2,12 @@
 closes; one that Esc ends; ten short ones; two that the window waits for; one during which the file is loaded again, and
 one more. Run inside Blender, by test_rendered.py. SHUTTER_FOOTAGE has the source, SHUTTER_RECIPE the effect."""
 
-# ruff: noqa: E402 (Blender finds the helpers once it knows their folders)
-import sys
-from functools import partial
-from pathlib import Path
-
-sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "blender")]
-sys.modules["moderngl"] = None  # there is no such module
-
 import bpy
-import traces
-from driver import OUT, area_of, key, move, override, play, region_of, saw, shot, until
-from given_edit import edit, opened
+import driver
+from driver import NAME, OUT, area_of, edit, film, key, move, override, part, region_of, render_ended, saw, until
+from given_edit import opened
 
 FRAMES = 30
-rendering = partial(bpy.app.is_job_running, "RENDER")
-
-
-def part(name):
-    return sys.modules[f"{traces.NAME}.shutter_addon.blender.{name}"]
-
-
-def windows():
-    return bpy.context.window_manager.windows
-
-
-def begun(folder, first=1, last=FRAMES):
-    """A job of the window."""
-    edit().frame_start, edit().frame_end = first, last
-    edit().render.filepath = f"{OUT / folder}/"
-    with bpy.context.temp_override(window=windows()[0], scene=edit()):
-        bpy.ops.render.render("INVOKE_DEFAULT", animation=True)
-
-
-def ended():
-    return until(lambda: not rendering(), "the render ends", 200)
 
 
 def written(folder):
@@ -46,44 +17,44 @@ def written(folder):
 def held():
     """The job's device, and what its textures take."""
     # The one that renders just now: to ask for it would make another where there is none.
-    device = part("rendering.sessions").OFFSCREEN._compositor.result().device
+    device = part("blender.rendering.sessions").OFFSCREEN._compositor.result().device
     # The budget counts the preview's as well.
     return type(device).__name__, device.name, sum(texture.bytes for texture in device._held)
 
 
-def story():
+def steps():
     yield from opened()
     bpy.ops.wm.save_as_mainfile(filepath=str(OUT / "edit.blend"))
-    begun("film")
+    film("film", 1, FRAMES)
     yield from until(lambda: written("film") > 3, "frames are rendered", 100)
     yield from second_window_closed()
-    yield from ended()
+    yield from render_ended()
     saw(film=held())
-    begun("stopped")
+    film("stopped", 1, FRAMES)
     yield from until(lambda: written("stopped") > 2, "frames are rendered", 100)
     region = region_of(area_of("SEQUENCE_EDITOR", "SEQUENCER"))
     move(region, region.width / 2, region.height / 2)
     yield
     key("Escape")
-    yield from ended()
+    yield from render_ended()
     for number in range(10):
-        begun("short", 1 + number, 3 + number)
-        yield from ended()
+        film("short", 1 + number, 3 + number)
+        yield from render_ended()
         saw(short=held())
     yield from sequencer_animation("waited", 1, 4)
-    device = bpy.context.preferences.addons[traces.NAME].preferences
+    device = bpy.context.preferences.addons[NAME].preferences
     device.device = "GPU"
     yield from sequencer_animation("refused", 1, 4)
     key("Escape")  # the menu that says why
     device.device = "AUTO"
     yield 0.5
-    begun("left")
+    film("left", 1, FRAMES)
     yield from until(lambda: written("left") > 2, "frames are rendered", 100)
     yield from second_window_closed()  # until another one is drawn, Blender's GPU is not current
     bpy.ops.wm.open_mainfile(filepath=str(OUT / "edit.blend"))
     yield 1.0
-    begun("after", 1, 5)
-    yield from ended()
+    film("after", 1, 5)
+    yield from render_ended()
     saw(after=held())
 
 
@@ -93,16 +64,13 @@ def sequencer_animation(folder, first, last):
     edit().render.filepath = f"{OUT / folder}/"
     with override("PREVIEW"):
         bpy.ops.render.opengl("INVOKE_DEFAULT", animation=True, sequencer=True)
-    yield from ended()
+    yield from render_ended()
     yield 0.5
-    shot(folder)
+    driver.shot(folder)
 
 
 def second_window_closed():
     bpy.ops.wm.window_new()
     yield 0.5
-    with bpy.context.temp_override(window=windows()[-1]):
+    with bpy.context.temp_override(window=driver.windows()[-1]):
         bpy.ops.wm.window_close()
-
-
-play(story)

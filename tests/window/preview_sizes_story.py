@@ -2,25 +2,19 @@
 
 Renders of one frame go to SHUTTER_PICTURES, whatever was shown before; what they have to be is test_window.py's."""
 
-# ruff: noqa: E402 (Blender finds the helpers once it knows their folder)
 import json
 import subprocess
-import sys
 import time
-from pathlib import Path
-
-sys.path[:0] = [str(Path(__file__).parent)]
 
 import bpy
 import driver
 import story
 
 FRAME = 50
-_part = "bl_ext.user_default.virtual_shutter.shutter_addon.blender.{}".format
 
 
 def sessions():
-    return sys.modules[_part("rendering.sessions")]
+    return driver.part("blender.rendering.sessions")
 
 
 def space():
@@ -50,8 +44,7 @@ def effect_added():
     with driver.override("SEQUENCER"):
         assert bpy.ops.shutter.recipe_import(filepath=str(driver.OUT / "recipe.json")) == {"FINISHED"}
     space().show_region_ui = space().show_gizmo = space().show_overlays = False
-    with driver.override("PREVIEW"):
-        bpy.ops.sequencer.view_all_preview()
+    story.all_viewed()
     yield 1.0
 
 
@@ -59,12 +52,8 @@ def shown(name, **settings):
     """The preview with these settings of its space."""
     for key, value in settings.items():
         setattr(space(), key, value)
-    region = story.preview()
-    driver.move(region, region.width / 2, region.height + 12)
-    region.tag_redraw()
-    yield 1.0
-    yield from driver.shot_when_shown(name)
-    driver.saw(step=name, crop=story.crop(), composed=composed())
+    story.preview().tag_redraw()
+    yield from story.seen(name, composed=composed)
 
 
 def sizes():
@@ -74,7 +63,7 @@ def sizes():
     for view in ("SPLIT", "COEFFICIENTS", "SCRIBBLES", "RESULT"):
         settings.view = view
         yield from shown(f"view_{view}")
-    strip = story.edit().sequence_editor.active_strip
+    strip = driver.edit().sequence_editor.active_strip
     strip.transform.scale_x = strip.transform.scale_y = 2.0
     yield from shown("enlarged")
     strip.transform.scale_x = strip.transform.scale_y = 1.0
@@ -88,7 +77,7 @@ def sizes():
 def proxies():
     """Read at their size, where they are to be used; they stay for what follows. Blender has the others built by
     itself, as the preview's size changes."""
-    source = next(strip for strip in story.edit().sequence_editor.strips if strip.type == "MOVIE")
+    source = next(strip for strip in driver.edit().sequence_editor.strips if strip.type == "MOVIE")
     source.select = source.use_proxy = source.proxy.build_25 = True
     yield from shown("no_proxy_built", proxy_render_size="PROXY_25")
     with driver.override("SEQUENCER"):
@@ -99,7 +88,7 @@ def proxies():
     yield from shown("proxy")
     yield from shown("proxy_unused", use_proxies=False)
     yield from shown("proxy_of_half", use_proxies=True, proxy_render_size="PROXY_50")
-    settings, effect = bpy.context.window_manager.virtual_shutter, story.edit().sequence_editor.active_strip
+    settings, effect = bpy.context.window_manager.virtual_shutter, driver.edit().sequence_editor.active_strip
     settings.view, settings.split = "SPLIT", 1.0
     yield from shown("proxy_still", proxy_render_size="PROXY_25")
     settings.view, settings.split = "RESULT", 0.5
@@ -109,37 +98,31 @@ def proxies():
 
 
 def in_a_job(name):
-    edit, ended = story.edit(), []
-    edit.render.filepath = str(driver.OUT / f"{name}.png")
-    bpy.app.handlers.render_complete.append(lambda *_: ended.append(True))
-    with driver.override("PREVIEW"):
-        bpy.ops.render.render("INVOKE_DEFAULT", write_still=True)
-    yield from driver.until(lambda: ended, "the render ends", 40)
-    del bpy.app.handlers.render_complete[-1]
-    yield from driver.until(lambda: not bpy.app.is_job_running("RENDER"), "its job ends")
+    driver.render(f"{name}.png", write_still=True)
+    yield from driver.render_ended()
     yield 0.5
 
 
 def by_script(name, scene=None):
-    edit = scene or story.edit()
+    edit = scene or driver.edit()
     edit.render.filepath = str(driver.OUT / f"{name}.png")
     bpy.ops.render.render(write_still=True, scene=edit.name)
 
 
 def by_opengl(name):
-    story.edit().render.filepath = str(driver.OUT / f"{name}.png")
+    driver.edit().render.filepath = str(driver.OUT / f"{name}.png")
     with driver.override("PREVIEW"):
         bpy.ops.render.opengl(sequencer=True, write_still=True)
 
 
 def by_opengl_in_a_job(name):
     """As by the preview's menu, which renders beside the main thread, and has that wait."""
-    edit, written = story.edit(), driver.OUT / f"{name}{FRAME:04d}.png"
+    edit, written = driver.edit(), driver.OUT / f"{name}{FRAME:04d}.png"
     edit.render.filepath = str(driver.OUT / name)
     limits, (edit.frame_start, edit.frame_end) = (edit.frame_start, edit.frame_end), (FRAME, FRAME)
     with driver.override("PREVIEW"):
         bpy.ops.render.opengl("INVOKE_DEFAULT", sequencer=True, animation=True)
-    yield from driver.until(lambda: written.exists() and not bpy.app.is_job_running("RENDER"), "it is rendered", 40)
+    yield from driver.until(lambda: written.exists() and not driver.rendering(), "it is rendered", 40)
     edit.frame_start, edit.frame_end = limits
     edit.frame_set(FRAME)
     yield 0.5
@@ -154,13 +137,13 @@ def played(seconds):
 def stopped():
     with driver.override("SEQUENCER"):
         bpy.ops.screen.animation_cancel(restore_frame=False)
-    story.edit().frame_set(FRAME)
+    driver.edit().frame_set(FRAME)
     yield 1.0
 
 
 def kept_time():
     """Playing with Frame Dropping: when each picture was drawn, at which frame, and of which source frame it is."""
-    edit, drawn = story.edit(), []
+    edit, drawn = driver.edit(), []
 
     def note():
         ((_snapshot, _frame, request),) = sessions().WINDOW.requests.values()  # what was drawn, as above
@@ -193,12 +176,12 @@ def in_a_handler(name):
 def other_edit():
     """A scene that shows the edit as a strip."""
     other = bpy.data.scenes.new("Other")
-    render, own = other.render, story.edit().render
+    render, own = other.render, driver.edit().render
     for name in ("resolution_x", "resolution_y", "dither_intensity", "fps"):
         setattr(render, name, getattr(own, name))
     other.view_settings.view_transform = "Standard"
     render.image_settings.media_type, render.image_settings.file_format = "IMAGE", "PNG"
-    strip = other.sequence_editor_create().strips.new_scene("Edit", story.edit(), 1, 1)
+    strip = other.sequence_editor_create().strips.new_scene("Edit", driver.edit(), 1, 1)
     strip.scene_input = "SEQUENCER"
     other.frame_set(FRAME)
     return other
@@ -206,9 +189,6 @@ def other_edit():
 
 def tricked():
     """Renders of the same frame, after and between previews of a quarter's size."""
-    render = story.edit().render
-    render.image_settings.media_type, render.image_settings.file_format = "IMAGE", "PNG"
-    render.dither_intensity = 0
     space().proxy_render_size = "PROXY_25"
     yield 1.0
     yield from in_a_job("job")
@@ -221,7 +201,7 @@ def tricked():
     yield 1.0
     yield from by_opengl_in_a_job("opengl_job_")
     yield from played(1.5)
-    story.edit().frame_set(FRAME)
+    driver.edit().frame_set(FRAME)
     yield from in_a_job("playing")  # of the frame that it begins with, while the playhead goes on
     yield from stopped()
     yield from in_a_handler("handler")
@@ -235,19 +215,29 @@ def in_background(frame):
     """The same frame of the saved file, by a Blender without a window."""
     path = driver.OUT / "edit.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
-    name = "bl_ext.user_default.virtual_shutter"
     output = str(driver.OUT / "background_")
-    command = [bpy.app.binary_path, "--factory-startup", "--addons", name, "-b", path, "-o", output, "-f", str(frame)]
+    command = [
+        bpy.app.binary_path,
+        "--factory-startup",
+        "--addons",
+        driver.NAME,
+        "-b",
+        path,
+        "-o",
+        output,
+        "-f",
+        str(frame),
+    ]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     yield from driver.until(lambda: process.poll() is not None, "the render without a window ends", 60)
     assert process.returncode == 0
     driver.saw(background=process.stdout.read())
 
 
-def told():
-    yield from story.opened()
+def steps():
+    yield from story.opened(640, 360)
     yield from story.movie_added()
-    story.edit().frame_set(FRAME)
+    driver.edit().frame_set(FRAME)
     yield from effect_added()
     space().proxy_render_size = "PROXY_100"
     yield from kept_time()
@@ -255,7 +245,3 @@ def told():
     yield from proxies()
     yield from tricked()
     yield from in_background(FRAME)
-
-
-if __name__ == "__main__":
-    driver.play(told)

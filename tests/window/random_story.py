@@ -2,30 +2,20 @@
 inside Blender, by test_random.py. SHUTTER_FOOTAGE has the source, SHUTTER_RECIPE the effect, SHUTTER_SEED and
 SHUTTER_STEPS say which operators and how many, SHUTTER_HIDDEN the Python packages that this Blender shall lack."""
 
-# ruff: noqa: E402 (Blender finds the helpers once it knows their folders)
 import os
 import random
-import sys
-from pathlib import Path
-
-sys.modules |= dict.fromkeys(os.environ.get("SHUTTER_HIDDEN", "").split())  # None: there is no such module
-sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "blender")]
 
 import addon_utils
 import bpy
+import driver
 import gpu_guard
-import traces
-from driver import OUT, area_of, enable, override, play, quit_blender, saw, until
-from given_edit import edit, opened
+from driver import NAME, OUT, area_of, edit, enable, film, override, part, pen_left, quit_blender, windows
+from given_edit import opened
 
 FILE, LIBRARY = str(OUT / "edit.blend"), str(OUT / "library.blend")
 ENGINE, LAST = "VIRTUAL_SHUTTER", 30
 random_ = random.Random(int(os.environ["SHUTTER_SEED"]))
 _number = 0  # of pictures
-
-
-def windows():
-    return bpy.context.window_manager.windows
 
 
 def strips(kind=None):
@@ -143,8 +133,7 @@ def drawn():
     with override("PREVIEW"):
         if bpy.ops.shutter.draw.poll():
             bpy.ops.shutter.draw("EXEC_DEFAULT", True, new=random_.random() < 0.5)
-    with override("PREVIEW"):
-        bpy.ops.wm.tool_set_by_id(name="builtin.select_box")
+    pen_left()
 
 
 def saved():
@@ -160,7 +149,7 @@ def new_file():
     bpy.ops.wm.read_homefile(app_template="Video_Editing")
     if random_.random() < 0.5:
         yield
-    if not addon_utils.check(traces.NAME)[1]:
+    if not addon_utils.check(NAME)[1]:
         enable()
     file_opened()
 
@@ -175,7 +164,7 @@ def appended():
 
 
 def disabled():
-    addon_utils.disable(traces.NAME)
+    addon_utils.disable(NAME)
     if random_.random() < 0.5:
         yield
     enable()
@@ -188,21 +177,18 @@ def window_closed():
         bpy.ops.wm.window_close()
     # Here Blender's GPU is not current. Operators that push undo end Blender by themselves.
     if random_.random() < 0.7:
-        random_.choice((file_opened, removed, still_rendered, lambda: addon_utils.disable(traces.NAME)))()
-        if not addon_utils.check(traces.NAME)[1]:
+        random_.choice((file_opened, removed, still_rendered, lambda: addon_utils.disable(NAME)))()
+        if not addon_utils.check(NAME)[1]:
             enable()
 
 
 def film_rendered():
-    edit().frame_start = random_.randint(1, LAST)
-    edit().frame_end = edit().frame_start + 2
-    edit().render.filepath = f"{OUT / 'film'}/"
-    with bpy.context.temp_override(window=windows()[0], scene=edit()):
-        bpy.ops.render.render("INVOKE_DEFAULT", animation=True)
+    first = random_.randint(1, LAST)
+    film("film", first, first + 2)
     if random_.random() < 0.3:
         yield
         undone()
-    yield from until(lambda: not bpy.app.is_job_running("RENDER"), "the film is rendered", 60)
+    yield from driver.render_ended()
 
 
 def still_shown():
@@ -210,7 +196,7 @@ def still_shown():
     bpy.context.preferences.view.render_display_type = "WINDOW"
     with bpy.context.temp_override(window=windows()[0], scene=edit()):
         bpy.ops.render.render("INVOKE_DEFAULT")
-    yield from until(lambda: not bpy.app.is_job_running("RENDER"), "the picture is rendered", 60)
+    yield from driver.until(lambda: not driver.rendering(), "the picture is rendered", 60)
     bpy.context.preferences.view.render_display_type = "NONE"
     for window in list(windows())[1:]:
         with bpy.context.temp_override(window=window):
@@ -226,9 +212,9 @@ def still_rendered():
     _number += 1
     edit().render.filepath = str(OUT / f"still{_number:03d}.png")
     bpy.ops.render.render(write_still=True, scene="Edit")
-    if (failure := sys.modules[f"{traces.NAME}.shutter_addon.blender.rendering.render_job"].failure()) is not None:
+    if (failure := part("blender.rendering.render_job").failure()) is not None:
         print(f"refused: {failure}", flush=True)
-    saw(still=f"still{_number:03d}.png", shows=expected)
+    driver.saw(still=f"still{_number:03d}.png", shows=expected)
 
 
 def expectation():
@@ -306,9 +292,8 @@ def check(did):
 
 def begun():
     """The edit that all begins with: the effect, and an annotation of the editor's own."""
-    bpy.context.preferences.filepaths.temporary_directory = str(
-        OUT
-    )  # where Blender's clipboard is, else other Blenders'
+    # Where Blender's clipboard is: else that of other Blenders.
+    bpy.context.preferences.filepaths.temporary_directory = str(OUT)
     yield from opened()
     edit().frame_end = LAST
     edit().sequence_editor.use_cache_raw = edit().sequence_editor.use_cache_final = True
@@ -322,7 +307,7 @@ def begun():
     copied()  # so that there is something to paste
 
 
-def story():
+def steps():
     yield from begun()
     gpu_guard.on()
     did = []
@@ -340,6 +325,3 @@ def story():
     quit_blender()
     yield 30
     raise AssertionError("Blender did not quit")
-
-
-play(story)

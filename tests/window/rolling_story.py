@@ -1,19 +1,10 @@
 """A pole that a rolling shutter has skewed: Find Readout and Rolling Shutter Repair from the menu, and undo. Run inside
 Blender, by test_window.py."""
 
-# ruff: noqa: E402 (Blender finds the helpers once it knows their folder)
-import os
-import sys
-from pathlib import Path
-
-sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "blender")]
-sys.path.append(os.environ["SHUTTER_PACKAGES"])
-
 import bpy
 import driver
 import numpy as np
 import story
-from support import write_frames
 
 REPAIR, FIND = 9, 10  # the entries in the menu of regions
 MENU = 210  # where that is below four shutters, in pixels below the sidebar's upper edge
@@ -21,11 +12,10 @@ FIELD = 210, 78  # of the readout in the panel of the last operation, to the rig
 ADJUSTED = 30
 COUNT, SIZE, READOUT = 16, (360, 640), 0.6
 SHOWN = 10  # the pole is fastest here
-FILM = driver.OUT / "film"
 
 
 def frame(number):
-    """A red pole and grey ones before a wall, each row at its own moment."""
+    """A red pole and grey ones before a wall, each row at its own moment; at half of SIZE."""
     y, x = (np.arange(SIZE[0]) + 0.5)[:, None], np.arange(SIZE[1])[None]
     moved = 60 * np.sin((number + READOUT * (y / SIZE[0] - 0.5)) / 3)
     wall = 150 + 40 * np.sin((x - moved) / 17) + 0.1 * y
@@ -33,38 +23,30 @@ def frame(number):
     for left, wide, color in ((110, 12, 60), (210, 16, 40), (300, 14, 50), (420, 20, (190, 10, 10)), (510, 12, 70)):
         covered = np.clip(np.minimum(x + 1, left + wide + moved) - np.maximum(x, left + moved), 0, 1)[..., None]
         picture = picture * (1 - covered) + np.array(color) * covered
-    return np.rint(picture).clip(0, 255).astype(np.uint8)
+    halves = picture.reshape(SIZE[0] // 2, 2, SIZE[1] // 2, 2, 3).mean(axis=(1, 3))
+    return np.rint(halves).clip(0, 255).astype(np.uint8)
 
 
 def opened():
-    yield from story.opened()
+    yield from story.pictures_opened([frame(number) for number in range(COUNT)], SHOWN)
     yield from driver.edge_moved(driver.area_of("SEQUENCE_EDITOR", "SEQUENCER"), 0, -296)
-    first = write_frames(FILM, [frame(number) for number in range(COUNT)])
-    yield from story.pictures_added(first, SIZE)
-    story.edit().frame_set(SHOWN)
-    story.effect().inbetween = "1"
     for bar in story.effect().shutters[0].bars[1:]:  # a still frame
         bar.weight = 0.0
     bpy.ops.ed.undo_push(message="Start")
-    with driver.override("PREVIEW"):
-        bpy.ops.sequencer.view_all_preview()
+    story.all_viewed()
     yield 1.0
 
 
 def readout():
     """In per cent, by the ramp; 0: there is none."""
-    repair = sys.modules["bl_ext.user_default.virtual_shutter.shutter_addon.blender.editing.rolling_shutter"]
+    repair = driver.part("blender.editing.rolling_shutter")
     known = repair.of(story.effect())
     return known and round(100 * known.readout, 1)
 
 
 def shown(name):
-    region = story.preview()
-    driver.move(region, region.width / 2, region.height + 12)
-    yield 1.0
-    yield from driver.shot_when_shown(name)
-    facts = {"readout": readout(), "smooth": story.effect().inbetween}
-    driver.saw(step=name, crop=story.crop(), regions=len(story.effect().regions), **facts)
+    facts = {"readout": readout, "smooth": lambda: story.effect().inbetween}
+    yield from story.seen(name, regions=lambda: len(story.effect().regions), **facts)
 
 
 def adjusted():
@@ -86,7 +68,7 @@ def adjusted():
     yield 0.5
 
 
-def told():
+def steps():
     yield from opened()
     yield from shown("1_skewed")
     yield from story.chosen_beside_draw(FIND)
@@ -104,7 +86,3 @@ def told():
         driver.saw(undone=times, readout=readout())
     yield from driver.until(lambda: not readout(), "it is undone")
     yield from shown("5_undone")
-
-
-if __name__ == "__main__":
-    driver.play(told)

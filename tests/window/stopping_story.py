@@ -3,24 +3,13 @@ between two passes. Run inside Blender, by test_rendered.py.
 
 SHUTTER_RECIPE: of a picture that takes hundreds of passes; SHUTTER_HIDDEN: a package that shall be missing."""
 
-# ruff: noqa: E402 (Blender finds the helpers once it knows their folders)
 import os
-import sys
 import threading
-from functools import partial
-from importlib import import_module
-from pathlib import Path
-
-sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "blender")]
-if os.environ.get("SHUTTER_HIDDEN"):
-    sys.modules[os.environ["SHUTTER_HIDDEN"]] = None  # there is no such module
 
 import bpy
-import traces
-from driver import OUT, key, play, saw, shot, until, xdotool
-from given_edit import edit, opened
+from driver import film, key, part, render_ended, rendering, saw, shot, until, xdotool
+from given_edit import opened
 
-rendering = partial(bpy.app.is_job_running, "RENDER")
 TICK = 0.01
 
 
@@ -58,18 +47,11 @@ class Passes:
         return len(self.whole) > 3 and self.whole[-1] / 20 < self.all - self.begun < self.whole[-1] / 3
 
 
-def part(name):
-    return import_module(f"{traces.NAME}.shutter_addon.{name}")
-
-
-def story():
+def steps():
     yield from opened()
     passes = Passes()
     bpy.context.preferences.view.render_display_type = "WINDOW"
-    edit().frame_start, edit().frame_end = 1, 60
-    edit().render.filepath = str(OUT / "film") + "/"
-    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0], scene=edit()):
-        bpy.ops.render.render("INVOKE_DEFAULT", animation=True)
+    film("film", 1, 60)
     yield from until(lambda: len(passes.whole) > 3, "frames are made", 120)
     yield from until(lambda: len(bpy.context.window_manager.windows) == 2, "the render has its window")
     window = bpy.context.window_manager.windows[1]
@@ -87,13 +69,5 @@ def story():
     yield from until(lambda: not last.is_alive(), "the render's device is free", 60, wait=TICK)
     saw(after=passes.all - ended, whole=passes.whole[0], finished_after=len(passes.whole) - whole)
     # what comes next is right
-    edit().render.filepath = str(OUT / "after") + "/"
-    edit().frame_start, edit().frame_end = 3, 4
-    complete = []
-    bpy.app.handlers.render_complete.append(lambda scene, *_: scene.name == "Edit" and complete.append(True))
-    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0], scene=edit()):
-        bpy.ops.render.render("INVOKE_DEFAULT", animation=True)
-    yield from until(lambda: complete, "another film is rendered", 120)
-
-
-play(story)
+    film("after", 3, 4)
+    yield from render_ended()

@@ -1,25 +1,22 @@
 """The first minutes of an editor, in a real window, by mouse and keyboard: run inside Blender, by test_window.py.
 
-From an empty Video Editing file to a finished picture. After every step the effect's data and the preview's picture are
+Bars between keys and the extension disabled; an effect without a mouse; then from an empty Video Editing file to a
+finished picture. After every step the effect's data and the preview's picture are
 kept; then every step is undone and redone, and both must be what they were. Pictures and facts go to SHUTTER_PICTURES.
 """
 
 import os
-import sys
-from pathlib import Path
 
+import bars_and_disable
 import bpy
-
-sys.path.insert(0, str(Path(__file__).parent))
 import driver
+import keyboard_story
+from driver import edit
+from support import write_frames
 
 FOOTAGE = os.environ["SHUTTER_FOOTAGE"]
 FRAME, LATER = 50, 90
-
-
-def edit():
-    """Undo makes a new scene of it: never keep it."""
-    return bpy.data.scenes["Edit"]
+WIDTH, HEIGHT = 320, 180
 
 
 def effect():
@@ -61,41 +58,45 @@ def crop():
     return [left, bottom - region.height + 1, region.width, region.height]
 
 
-def seen(name):
-    """Data and picture as they are now, the pointer where it highlights nothing: over the preview's header."""
+def pointer_left():
+    """Where it highlights nothing: over the preview's header."""
     region = preview()
     driver.move(region, region.width / 2, region.height + 12)
+
+
+def seen(name, **measures):
+    """The picture as it is now, and facts, by functions; by default the edit's data."""
+    pointer_left()
     yield 0.8
     yield from driver.shot_when_shown(name)
-    driver.saw(step=name, facts=facts(), crop=crop(), frame=edit().frame_current)
+    measures = measures or {"facts": facts, "frame": lambda: edit().frame_current}
+    driver.saw(step=name, crop=crop(), **{fact: measure() for fact, measure in measures.items()})
 
 
-def pictures_added(first, size):
-    """A strip of all pictures beside the first, height and width in pixels, under a new effect, in a saved edit."""
-    scene, paths = edit(), sorted(first.parent.iterdir())
-    scene.render.resolution_y, scene.render.resolution_x = size
-    source = scene.sequence_editor.strips.new_image("Film", str(first), 1, 1)
-    for path in paths[1:]:
-        source.elements.append(path.name)
-    scene.sequence_editor.active_strip = source
-    scene.frame_end = len(paths)
+def all_viewed():
+    with driver.override("PREVIEW"):
+        bpy.ops.sequencer.view_all_preview()
+
+
+def opened(width=1280, height=720):
+    yield from driver.video_editing_opened()
+    edit().render.resolution_x, edit().render.resolution_y, edit().frame_end = width, height, 132
+    yield 0.5
+    bpy.ops.ed.undo_push(message="Start")
+
+
+def pictures_opened(pictures, frame):
+    """A saved edit of a strip of these pictures under a new effect, without moments, at a frame."""
+    height, width = pictures[0].shape[:2]
+    yield from opened(width, height)
+    edit().frame_end = len(pictures)
+    driver.strip_added("Film", write_frames(driver.OUT / "film", pictures))
     bpy.ops.wm.save_as_mainfile(filepath=str(driver.OUT / "film.blend"))
     with driver.override("SEQUENCER"):
         bpy.ops.shutter.add_effect("INVOKE_DEFAULT", True)
     yield 1.0
-
-
-def opened():
-    yield from driver.video_editing_opened()
-    scene = bpy.data.scenes[0]
-    scene.name = "Edit"
-    scene.render.resolution_x, scene.render.resolution_y = 1280, 720
-    scene.frame_end = 132
-    scene.view_settings.view_transform = "Standard"
-    scene.sequence_editor_create()
-    bpy.context.preferences.view.smooth_view = 0  # a view that still moves is nowhere
-    yield 0.5
-    bpy.ops.ed.undo_push(message="Start")
+    edit().frame_set(frame)
+    effect().inbetween = "1"
 
 
 def movie_added():
@@ -116,12 +117,11 @@ def movie_added():
 
 
 def effect_added():
-    yield from driver.effect_added(edit)
+    yield from driver.effect_added()
     assert [shutter.name for shutter in effect().shutters] == ["Long", "Sharp"]
     sidebar = driver.region_of(driver.area_of("SEQUENCE_EDITOR", "PREVIEW"), "UI")
     yield from driver.until(lambda: sidebar.active_panel_category == "Shutter", "the Shutter tab opens")
-    with driver.override("PREVIEW"):
-        bpy.ops.sequencer.view_all_preview()
+    all_viewed()
     yield 0.5
 
 
@@ -135,8 +135,7 @@ def scribbled():
     yield from driver.drag(region, [(w * x, h * y) for x, y in ((0.4, 0.5), (0.45, 0.6), (0.5, 0.6), (0.55, 0.5))])
     layer = effect().scene.annotation.layers[effect().regions[0].layer]
     assert [len(frame.strokes) for frame in layer.frames] == [1]
-    with driver.override("PREVIEW"):
-        bpy.ops.wm.tool_set_by_id(name="builtin.select_box")
+    driver.pen_left()
     region.tag_redraw()  # its handles are back, which else come with the pointer
     yield
 
@@ -248,8 +247,7 @@ def saved_and_loaded():
     bpy.ops.wm.open_mainfile(filepath=str(path))
     yield 1.5
     assert facts() == before
-    with driver.override("PREVIEW"):
-        bpy.ops.sequencer.view_all_preview()
+    all_viewed()
     yield from seen("9_loaded")
 
 
@@ -275,14 +273,14 @@ def in_agreement(frame=70):
         driver.move(region, 5, region.height - 5)
         yield 1.5
         yield from driver.shot_when_shown(name)
-        left, top = driver.screen(region, region.width / 2 - 640, region.height / 2 + 360)
-        driver.saw(picture=name, box=[left, top + 1, left + 1280, top + 721])
+        left, top = driver.screen(region, region.width / 2 - WIDTH // 2, region.height / 2 + HEIGHT // 2)
+        driver.saw(picture=name, box=[left, top + 1, left + WIDTH, top + HEIGHT + 1])
     # Where the sequencer does not render its preview, the draw handler draws the result itself.
     bpy.context.window_manager.virtual_shutter.live = True
     edit().render.sequencer_gl_preview = "SOLID"
     yield 1.5
     yield from driver.shot_when_shown("drawn")
-    driver.saw(picture="drawn", box=[left, top + 1, left + 1280, top + 721])
+    driver.saw(picture="drawn", box=[left, top + 1, left + WIDTH, top + HEIGHT + 1])
     edit().render.sequencer_gl_preview = "RENDERED"
     with driver.override("PREVIEW"):
         bpy.ops.screen.back_to_previous()
@@ -293,17 +291,8 @@ def in_agreement(frame=70):
 
 def rendered():
     """The current frame, as with F12: a job on another thread."""
-    render = edit().render
-    render.image_settings.media_type = "IMAGE"
-    render.image_settings.file_format = "PNG"
-    render.dither_intensity = 0
-    render.filepath = str(driver.OUT / "final.png")
-    done = []
-    bpy.app.handlers.render_complete.append(lambda *_: done.append(True))
-    with driver.override("PREVIEW"):
-        bpy.ops.render.render("INVOKE_DEFAULT", write_still=True)
-    # An effect scene's render within it is complete before.
-    yield from driver.until(lambda: done and not bpy.app.is_job_running("RENDER"), "the render ends", 30)
+    driver.render("final.png", write_still=True)
+    yield from driver.render_ended()
     driver.saw(picture="final")
 
 
@@ -316,7 +305,7 @@ def sequencer_animation(frame):
     driver.area_of("SEQUENCE_EDITOR", "PREVIEW").spaces.active.proxy_render_size = "PROXY_25"
     with driver.override("PREVIEW"):
         bpy.ops.render.opengl("INVOKE_DEFAULT", animation=True, sequencer=True)
-    yield from driver.until(lambda: not bpy.app.is_job_running("RENDER"), "the animation ends", 30)
+    yield from driver.render_ended()
     driver.move(preview(), 20, 20)  # the operator's end is at an event
     yield 0.5
 
@@ -324,7 +313,7 @@ def sequencer_animation(frame):
 def disabled_and_enabled():
     import addon_utils
 
-    addon_utils.disable("bl_ext.user_default.virtual_shutter", default_set=True)
+    addon_utils.disable(driver.NAME, default_set=True)
     yield 0.5
     driver.shot("disabled")
     assert not hasattr(bpy.types.Scene, "virtual_shutter")
@@ -334,8 +323,10 @@ def disabled_and_enabled():
     driver.shot("enabled")
 
 
-def story():
-    yield from opened()
+def steps():
+    yield from bars_and_disable.steps()
+    yield from keyboard_story.steps()
+    yield from opened(WIDTH, HEIGHT)
     for name, step in STEPS.items():
         if name == "7_later":
             yield from moved_to(LATER)
@@ -345,7 +336,3 @@ def story():
     yield from saved_and_loaded()
     yield from in_agreement()
     yield from disabled_and_enabled()
-
-
-if __name__ == "__main__":
-    driver.play(story)

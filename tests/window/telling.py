@@ -9,12 +9,17 @@ import os
 import shlex
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
+import av
+import numpy as np
+import OpenImageIO
 import pytest
 
 ROOT = Path(__file__).parents[2]
 WINDOW = os.environ.get("BLENDER_WINDOW", "")
+BUNNY = ROOT / "assets" / "bigbuckbunny.mp4"
 # Even numbers of pixels around the picture, so that its pixels fall on the screen's.
 SCREEN = "1600x1001x24"
 SMALL = "960x601x24"  # for stories that are not about the interface: drawing it takes a software renderer long
@@ -42,20 +47,21 @@ def linked(folder):
 
 
 def tell(story, backend, folder, *, before=(), screen=SCREEN, **given):
-    """Runs a story in Blender's window, with user folders of its own in `folder`; what it noted, and what Blender said
-    on the console. before: what its command stands behind, as NO_NETWORK; given: what the story finds in its
-    environment as SHUTTER_NAME."""
+    """Runs a story, a module of this folder, in Blender's window, with user folders of its own in `folder`, where
+    `console.txt` has what Blender says; what it noted. before: what its command stands behind, as NO_NETWORK; given:
+    what the story finds in its environment as SHUTTER_NAME."""
     environment = {
         "BACKEND": backend,
         "SCREEN": screen,
         "GUI_TIMEOUT": "1500",  # seconds: a long story on two cores, beside others
         "SHUTTER_PICTURES": str(folder),
         # A copy: Blender puts proxies beside a movie.
-        "SHUTTER_FOOTAGE": str(shutil.copy(ROOT / "assets" / "bigbuckbunny.mp4", folder)),
+        "SHUTTER_FOOTAGE": str(shutil.copy(BUNNY, folder)),
         "BLENDER_USER_RESOURCES": str(folder / "user"),
+        "SHUTTER_STORY": story,
     } | {f"SHUTTER_{name.upper()}": str(value) for name, value in given.items()}
     done = subprocess.run(
-        [*before, *shlex.split(WINDOW), str(Path(__file__).with_name(story))],
+        [*before, *shlex.split(WINDOW), str(Path(__file__).with_name("run_story.py"))],
         env=os.environ | environment,
         capture_output=True,
         text=True,
@@ -67,15 +73,66 @@ def tell(story, backend, folder, *, before=(), screen=SCREEN, **given):
     result = json.loads((folder / "result.json").read_text())
     assert not result["fault"], f"{result['fault']}\nPictures: {folder}"
     assert done.returncode == 0, console[-4000:]
-    return result["seen"], console
+    assert "Traceback" not in console
+    return result["seen"]
+
+
+def steps_of(seen):
+    """The entries of a story's steps, by their names."""
+    return {entry["step"]: entry for entry in seen if "step" in entry}
+
+
+def facts_of(seen):
+    """All facts that a story noted, by their names."""
+    return {name: value for entry in seen for name, value in entry.items()}
 
 
 def packages(folder):
-    """A folder of what tracking needs besides what the Blender of a distribution has."""
+    """A new folder in this one, of what tracking needs besides what the Blender of a distribution has."""
     import cv2
 
+    folder = folder / "packages"
     folder.mkdir()
     site = Path(cv2.__file__).parents[1]
     for name in ("cv2", "tqdm", *(p.name for p in site.glob("opencv*.libs"))):
         (folder / name).symlink_to(site / name)
     return folder
+
+
+def excerpt(movie, frames, to, size):
+    """Some frames of a movie, small, without its sound, which would be a strip of its own."""
+    with av.open(movie) as read, av.open(to, "w") as written:
+        stream = written.add_stream("libx264", rate=24, options={"qp": "10"})
+        (stream.width, stream.height), stream.pix_fmt = size, "yuv420p"
+        for number, frame in enumerate(read.decode(video=0)):
+            if number in frames:
+                smaller = frame.to_ndarray(width=size[0], height=size[1], format="rgb24")
+                written.mux(stream.encode(av.VideoFrame.from_ndarray(smaller)))
+        written.mux(stream.encode())
+    return to
+
+
+def noise(folder, count, size):
+    """The path of the first picture of a sequence of noise."""
+    folder = folder / "frames"
+    folder.mkdir()
+    for number, frame in enumerate(np.random.default_rng(1).integers(0, 256, (count, *size[::-1], 3), dtype=np.uint8)):
+        OpenImageIO.ImageBuf(frame).write(str(folder / f"{number + 1:04d}.png"))
+    return folder / "0001.png"
+
+
+def recipe(folder, bars, *strokes, width=0.1, keys=(), **more):
+    """The path of a recipe of a line with these bars, where all is exposed by all of the window's frames."""
+    strokes = strokes or [[[0.2, 0.2], [0.6, 0.9]]]
+    line = {"name": "Line", "shutter": "Sharp", "strokes": strokes, "width": width, "keys": list(keys)}
+    shutters = [{"name": "Long", "bars": [1] * len(bars)}, {"name": "Sharp", "bars": bars}]
+    data = {"version": 2, "window": len(bars), "border": True, "shutters": shutters, "regions": [line]}
+    path = folder / "recipe.json"
+    path.write_text(json.dumps(data | more))
+    return path
+
+
+def command_renders(source, recipe, output, *options):
+    """Pictures in a folder, as the command renders them on OpenGL."""
+    options = ("--recipe", recipe, "--output", output, "--device", "opengl", *options)
+    subprocess.run([sys.executable, "-m", "shutter_addon", "render", source, *options], check=True, cwd=ROOT)

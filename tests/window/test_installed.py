@@ -37,12 +37,11 @@ def means(picture):
 
 
 def test_from_the_zip_to_a_finished_film(zip_file, bunny, tmp_path):
-    (noted,), console = tell(
-        "finished_film.py", "opengl", tmp_path, zip=zip_file, recipe=RECIPE, frames="{}:{}".format(*FRAMES)
-    )
+    (noted,) = tell("finished_film", "opengl", tmp_path, zip=zip_file, recipe=RECIPE, frames="{}:{}".format(*FRAMES))
     recipe = json.loads(RECIPE.read_text())
     assert noted["shutters"] == [shutter["name"] for shutter in recipe["shutters"]]
     assert noted["regions"] == [region["name"] for region in recipe["regions"]]
+    console = (tmp_path / "console.txt").read_text()
     said = [line for line in console.splitlines() if line and not any(own in line for own in BLENDERS_OWN)]
     assert not said, "\n".join(said)
     options = ["--recipe", RECIPE, "--output", tmp_path / "frames", "--frames", "{}:{}".format(*FRAMES)]
