@@ -5,17 +5,13 @@ import bpy
 import driver
 import numpy as np
 import story
-from support import write_frames
 
 LAST = "bpy.ops.shutter.outline_it()"  # the last row of what edits a region that is drawn
 SHUTTER = 74  # the row with the region's shutter is so much higher, in units of the interface
 NOTES = 52, 45  # the button of the notes, from the right and from above
 # Both languages and both scales are seen, though not each with each: it takes a minute each.
 LAYOUTS = ("en_US", 1.0), ("de_DE", 1.5)
-
-
-COUNT, SIZE, SPEED = 10, (360, 640), 7
-FILM = driver.OUT / "film"  # with too few frames for its exposure
+COUNT, SIZE, SPEED = 10, (180, 320), 7  # of footage with too few frames for its exposure
 
 
 def frame(number):
@@ -30,14 +26,9 @@ def frame(number):
 
 
 def opened():
-    yield from story.opened()
-    first = write_frames(FILM, [frame(number) for number in range(COUNT)])
-    yield from story.pictures_added(first, SIZE)
-    driver.edit().frame_set(3)
-    story.effect().inbetween = "1"
+    yield from story.pictures_opened([frame(number) for number in range(COUNT)], 3)
     bpy.ops.ed.undo_push(message="Start")
-    with driver.override("PREVIEW"):
-        bpy.ops.sequencer.view_all_preview()
+    story.all_viewed()
     yield 1.0
 
 
