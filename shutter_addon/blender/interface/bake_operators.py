@@ -130,7 +130,7 @@ def stop() -> None:
 
 
 def forget() -> None:
-    """Stop and forget errors, before another file is loaded."""
+    """Stop and forget errors, before another file is loaded or the extension is disabled."""
     stop()
     _bake.failure = "", ""
 
@@ -169,6 +169,3 @@ def _ask_whether_stale() -> None:
     if (active := selection.active(bpy.context)) is not None:
         baked_strips.is_stale(*active)
         redraw(bpy.context)
-
-
-unregister = forget

@@ -76,7 +76,7 @@ def give_back(context: Context) -> None:
 
 
 def forget() -> None:
-    """Forget the pen before another file is loaded."""
+    """Forget the pen before another file is loaded or the extension is disabled."""
     give_back(bpy.context)
     _pen.tool = ""
 
@@ -131,4 +131,3 @@ register = listen
 
 def unregister() -> None:
     bpy.msgbus.clear_by_owner(_OWNER)
-    give_back(bpy.context)
