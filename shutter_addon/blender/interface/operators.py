@@ -324,12 +324,6 @@ def region_move(self: Operator, _context: Context, effect: PropertyGroup) -> set
     return _move(places, effect.active_region, self.direction, partial(region_edits.move_region, effect))
 
 
-@operator("Insert Region Keyframes", needs.a_region, icon="KEY_HLT")
-def region_key(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
-    """Insert keyframes for location, rotation and scale of the active region at the current frame"""
-    region_edits.key_region(effect, effect.active_region)
-
-
 @operator("Choose Source", icon="SEQUENCE", strip=STRIP)
 def source(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Choose the movie, image or clip strip whose frames the effect exposes"""

@@ -12,8 +12,7 @@ from ...core import revision
 from ...core.messages import EffectError
 from ...core.model import scribbles
 from ..data import selection, snapshot, validation
-from ..editing import bar_edits, drawn_places, region_edits, track_region
-from ..editing.motion_keys import MotionKeys
+from ..editing import bar_edits, drawn_places, motion_keys, track_region
 from . import drawing
 from .gizmo_groups import TWEAK, Dragged, View, WithKeys, view
 from .operator_bases import popup
@@ -147,9 +146,9 @@ class SHUTTER_GT_region(Dragged, Gizmo):
         if cancel:
             region.location, region.rotation, region.scale = self.before
             return
-        if bar_edits.auto_key(context) or MotionKeys(effect, index, region.motion).are_made():
+        if bar_edits.auto_key(context) or motion_keys.MotionKeys(effect, index, region.motion).are_made():
             try:
-                region_edits.key_region(effect, index)
+                motion_keys.insert(effect, index)
             except EffectError as error:  # gizmos have no reports
                 popup(context, str(error), icon="ERROR")
             context.area.tag_redraw()  # panels show whether it is keyed
