@@ -23,18 +23,7 @@ from ..output import error_report, matte_export
 from . import needs, sharp_frame
 from .bar_editor import bar_under
 from .matte_operators import STRIP
-from .operator_bases import (
-    UNDOABLE,
-    Mixin,
-    Named,
-    OfEffect,
-    chosen_file,
-    given,
-    kept,
-    operator,
-    redraw,
-    report,
-)
+from .operator_bases import UNDOABLE, Mixin, Named, OfEffect, chosen_file, given, kept, operator, redraw, report
 from .panel_parts import draw_properties, icon_of
 
 

@@ -39,7 +39,6 @@ from ..rendering import (
 from ..rendering.previews import Decision, Drawing
 from . import drawing, sharp_frame
 from .drawing import Quad
-from .panel_parts import too_few_frames
 
 VIEWS = (
     ("RESULT", "Result", "The finished picture"),
@@ -238,7 +237,7 @@ def _tell_detail(wanted: Drawing, size: tuple[int, int], say: Say) -> None:
 def _tell_strobing(known: float | None, is_new: bool, say: Say) -> None:
     """Add a note about too few frames, as strobing.look returns it."""
     if known is not None:
-        say(too_few_frames(known))
+        say(strobing.too_few_frames(known))
     if is_new:
         main_thread.later(preview_areas.redraw_panels)  # panels may have been drawn before
     if strobing.is_busy():
