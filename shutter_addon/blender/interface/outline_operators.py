@@ -13,11 +13,10 @@ from ...core.messages import UserError
 from ...core.model import outlines
 from ..data import selection, strips
 from ..editing import outline_drawings, track_region
-from ..rendering import outline_carrying
+from ..rendering import outline_carrying, previews
 from . import drawing, needs
 from .gizmo_groups import Dragged, View, WithKeys, view
 from .operator_bases import Beside, OfEffect, operator, redraw, report, show_status
-from .preview import show_carried
 from .region_gizmo import SHUTTER_GGT_region
 
 _COLOR = (0.2, 0.9, 1.0, 0.9)
@@ -46,7 +45,7 @@ class SHUTTER_OT_outline_needed(Beside, OfEffect, Operator):
         if waits or not frames:
             return self._go(context)
         self._file = file
-        outline_carrying.carry(file, frames, show_carried, shown.get(scene.frame_current))
+        outline_carrying.carry(file, frames, previews.show_carried, shown.get(scene.frame_current))
         return self.go_on(context)
 
     def goes_on(self, _context: Context) -> bool:
@@ -59,7 +58,7 @@ class SHUTTER_OT_outline_needed(Beside, OfEffect, Operator):
     def end(self, context: Context, is_stopped: bool) -> set[str] | None:
         if is_stopped or self._target.effect() is None:
             outline_carrying.stop()
-            show_carried()
+            previews.show_carried()
             return {"CANCELLED"}
         if (failure := outline_carrying.failure(self._file)) is not None:
             raise UserError(failure)
