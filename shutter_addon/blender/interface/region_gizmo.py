@@ -66,13 +66,8 @@ def place(context: Context) -> Place | None:
     middle = (low + high) / 2
     corner = high if region.kind == "RAMP" else np.maximum(high, middle + _NEAREST)
     # The corner rotates about the middle of these points, so they include its mirror image.
-    ((_, moved, _),) = scribbles.transform(
-        [[2 * middle - corner, corner, middle]],
-        region.location,
-        np.degrees(region.rotation),
-        region.scale,
-        seen_as.aspect,
-    )
+    numbers = region.location, np.degrees(region.rotation), region.scale
+    ((_, moved, _),) = scribbles.transform([[2 * middle - corner, corner, middle]], *numbers, seen_as.aspect)
     centre, corner = seen_as.on_region([middle + np.array(region.location), moved])
     return Place(centre, corner, seen_as)
 
