@@ -1,4 +1,4 @@
-"""Operators and the gizmo of outlines: track, correct, and find where a drawing is needed."""
+"""Operators and the gizmo of outlines and subjects: find, track, correct, and go to where a drawing is needed."""
 
 from contextlib import closing
 
@@ -12,7 +12,7 @@ from bpy.types import Context, Event, Gizmo, GizmoGroup, Operator, PropertyGroup
 from ...core.messages import UserError
 from ...core.model import outlines
 from ..data import selection, strips
-from ..editing import outline_drawings, track_region
+from ..editing import outline_drawings, subjects, track_region
 from ..rendering import outline_carrying, previews
 from . import drawing, needs
 from .gizmo_groups import Dragged, View, WithKeys, view
@@ -95,6 +95,30 @@ def outline_it(self: Operator, _context: Context, effect: PropertyGroup) -> set[
     """Make the active region an outline of the subject that its strokes mark or enclose at this frame"""
     if not outline_drawings.outline_it(self.edit, effect, self.effect_strip, effect.active_region):
         report(self, rpt_("No subject stands out from its surroundings"))
+        return {"CANCELLED"}
+    return None
+
+
+@operator("Find Subject", needs.strokes, only_seen=True)
+def subject_find(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
+    """Make the active region a subject, which a model finds under its strokes at this frame and follows"""
+    if not subjects.find(self.edit, effect, self.effect_strip, effect.active_region):
+        report(self, rpt_("The model finds no subject under the stroke: draw along its middle, or outline it"))
+        return {"CANCELLED"}
+    return None
+
+
+@operator("Scribble", needs.a_subject, icon="IPO_LINEAR")
+def subject_scribble(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
+    """Make the active subject a scribble: its strokes, as wide as the region's width"""
+    effect.regions[effect.active_region].kind = "LINE"
+
+
+@operator("Outline", needs.a_subject, icon="CURVE_BEZCIRCLE", only_seen=True)
+def subject_outline(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
+    """Make the active subject an outline, which is drawn where the subject has strokes"""
+    if not subjects.to_outline(self.edit, effect, self.effect_strip, effect.active_region):
+        report(self, rpt_("The subject has no outline there"))
         return {"CANCELLED"}
     return None
 
