@@ -88,11 +88,6 @@ def paths_relative(scene: Scene, folder: Path) -> AbstractContextManager[None]:
     return for_a_while(relative)
 
 
-def is_saved(path: Path) -> bool:
-    """Return whether a path is a .blend file."""
-    return path.suffix.lower() == ".blend"
-
-
 def open_edit(path: Path, name: str | None = None) -> Scene:
     """Open a .blend file without running its scripts, and return its scene of this name, or its active scene.
 
