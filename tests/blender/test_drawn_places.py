@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from shutter_addon.blender.data import annotations, selection, snapshot
-from shutter_addon.blender.editing import drawn_places, outline_drawings, region_edits
+from shutter_addon.blender.editing import drawn_places, motion_keys, outline_drawings, region_edits
 from shutter_addon.core.model import scribbles
 from shutter_addon.core.model.motions import Placement
 
@@ -44,7 +44,7 @@ def move(bpy, frame, placed):
     drawn_places.hold(effect, 0)
     region = effect.regions[0]
     region.location, region.rotation, region.scale = placed.location, np.radians(placed.rotation), placed.scale
-    region_edits.key_region(effect, 0)
+    motion_keys.insert(effect, 0)
 
 
 def seen(bpy, frame):
@@ -119,7 +119,7 @@ def test_a_file_of_before_means_what_it_meant(bpy, region):
     for frame, x in ((1, 0.0), (11, 100 / 640)):
         scene.frame_set(frame)
         region.location = x, 0
-        region_edits.key_region(effect, 0)
+        motion_keys.insert(effect, 0)
     assert same(seen(bpy, 11), np.add(SECOND, (100, 0)))
     pen(bpy, 11, FIRST)
     assert same(seen(bpy, 11), np.add(SECOND, (100, 0)), FIRST)

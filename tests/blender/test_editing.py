@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from support import state
 
 from shutter_addon.blender.data import annotations, consistency, fcurves, selection, strips
-from shutter_addon.blender.editing import add_effect, bar_edits, region_edits, shutter_edits
+from shutter_addon.blender.editing import add_effect, bar_edits, motion_keys, region_edits, shutter_edits
 from shutter_addon.core.model import shutters
 
 RNG = np.random.default_rng(5)
@@ -129,7 +129,7 @@ def test_a_duplicate_comes_behind_with_bars_and_keys_of_its_own(three):
 def test_a_removed_shutter_takes_its_keys_regions_and_layers_along(three):
     for name in "BAB":
         region_edits.add_region(three, three.shutters[name])
-        region_edits.key_region(three, len(three.regions) - 1)
+        motion_keys.insert(three, len(three.regions) - 1)
     shutters, regions = shutters_of(three), regions_of(three)
     shutter_edits.remove_shutter(three, 1)
     del shutters["B"], regions["B"], regions["B.001"]

@@ -5,7 +5,7 @@ import pytest
 from support import call, does, image_strip, request, started, write_frames
 
 from shutter_addon.blender.data import annotations, fcurves, selection, snapshot, strips
-from shutter_addon.blender.editing import bar_edits, region_edits, track_region
+from shutter_addon.blender.editing import bar_edits, motion_keys, region_edits, track_region
 from shutter_addon.blender.editing.motion_keys import MotionKeys
 from shutter_addon.core.model.motions import Placement
 
@@ -119,7 +119,7 @@ def move(bpy, frame, index, *, of=0):
     region, (angle, scale), (angle_drawn, scale_drawn) = effect.regions[0], turned(index), turned(of)
     region.location = (centre(index) - centre(of)) * (1, -1) / SIZE
     region.rotation, region.scale = np.radians(angle - angle_drawn), scale / scale_drawn
-    region_edits.key_region(effect, 0)
+    motion_keys.insert(effect, 0)
 
 
 def test_a_region_is_tracked_to_both_ends(bpy, region):
@@ -144,7 +144,7 @@ def test_a_wrong_frame_is_mended_by_a_key_and_tracking_again(bpy, edit, region):
     track(bpy)
     move(bpy, 25, 14)
     active(bpy)[1].regions[0].location[1] += 12 / SIZE[1]
-    region_edits.key_region(active(bpy)[1], 0)
+    motion_keys.insert(active(bpy)[1], 0)
     values = {frame: value for frame, value, kind, _ in keys(bpy)[1] if kind == "KEYFRAME"}
     assert values.keys() == {11, 25}
     track(bpy)
@@ -178,7 +178,7 @@ def test_frames_outside_of_what_was_tracked_stay_where_they_are(bpy, edit, regio
     for _drag in range(2):
         region.location[1] += 6 / SIZE[1]
         if is_keyed:  # as its handle does
-            region_edits.key_region(active(bpy)[1], 0)
+            motion_keys.insert(active(bpy)[1], 0)
     _edit, effect, strip = active(bpy)
     frames = track_region.frames_to_track(edit, strip, "FORWARD", 20)
     steps = track_region.track(edit, effect, strip, 0, frames, motion)
@@ -199,7 +199,7 @@ def test_keys_are_set_at_the_edits_frame(bpy, edit, region):
     other.frame_set(25)
     bpy.context.window.scene = other
     effect = edit.virtual_shutter.effects[0]
-    region_edits.key_region(effect, 0)
+    motion_keys.insert(effect, 0)
     bar_edits.key_bars(effect, 0)
     curves = fcurves.curves_under(edit, effect.path_from_id())
     assert {key.co[0] for curve in curves for key in curve.keyframe_points} == {11}
@@ -216,7 +216,7 @@ def test_tracks_of_a_stretched_timeline(bpy, edit, region):
     assert [track_region.confidence_at(effect, 0, frame) for frame in (11, 31)] == [1, None]
     move(bpy, 8, 13)
     effect.regions[0].location[1] += 12 / SIZE[1]
-    region_edits.key_region(effect, 0)
+    motion_keys.insert(effect, 0)
     assert [key[0] for key in keys(bpy)[0] if key[2] == "KEYFRAME"] == pytest.approx([11 / 3, 8])
     edit.frame_set(11)
     track(bpy)
@@ -487,7 +487,7 @@ def test_an_editors_key_mends_what_is_followed(bpy, edit, region, clip):
     call(bpy, "follow")
     edit.frame_set(21)
     active(bpy)[1].regions[0].location[1] += 0.1
-    region_edits.key_region(active(bpy)[1], 0)
+    motion_keys.insert(active(bpy)[1], 0)
     call(bpy, "follow")
     y = fcurves.find_curve(bpy.context.scene, "virtual_shutter.effects[0].regions[0].location", 1)
     off = {frame: y.evaluate(frame) - (centre(0) - centre(frame - 11))[1] / SIZE[1] for frame in (11, 16, 21, 28)}

@@ -12,7 +12,7 @@ from support import image_strip, picture_of, sequencer, started, state, write_fr
 
 from shutter_addon import blender
 from shutter_addon.blender.data import annotations, fcurves, preview_areas, selection, snapshot
-from shutter_addon.blender.editing import bar_edits, reconcile, region_edits
+from shutter_addon.blender.editing import bar_edits, motion_keys, reconcile, region_edits
 from shutter_addon.blender.interface import bar_editor, operators, panels, probe_gizmo, region_gizmo
 from shutter_addon.blender.output import matte_export
 from shutter_addon.blender.rendering import effect_source, invalidation, render_settings, sessions
@@ -39,7 +39,7 @@ def effect(bpy, edit, tmp_path):
         edit.frame_set(frame)
         effect.shutters[1].bars[0].weight = frame / 9
         bar_edits.key_bars(effect, 1)
-        region_edits.key_region(effect, 0)
+        motion_keys.insert(effect, 0)
     edit.keyframe_insert(f"{effect.path_from_id()}.source_time")
     selection.choose(edit, strip)
     edit.frame_set(4)

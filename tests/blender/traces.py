@@ -5,6 +5,7 @@ Run inside Blender, or with the bpy wheel: enables and disables the extension tw
 import gc
 import sys
 import types
+import typing
 import weakref
 
 import bpy  # before its addon_utils
@@ -63,6 +64,9 @@ def forget():
                 references[f"{name}.{value.__qualname__}"] = weakref.ref(value)
     del value
     vars(sys.modules["bl_ext.user_default"]).pop("virtual_shutter", None)
+    # private: caches of `typing` keep the last types of a recipe's fields, which are not more with each time.
+    for clear in typing._cleanups:
+        clear()
     gc.collect()
     assert len(references) > 100
     return [name for name, reference in references.items() if reference() is not None]

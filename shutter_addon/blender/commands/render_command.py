@@ -37,7 +37,7 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 
 def run(arguments: Namespace) -> None:
-    if whole_edits.is_saved(arguments.source):
+    if arguments.source.suffix.lower() == ".blend":
         _render_edit(arguments)
     else:
         _render_source(arguments)

@@ -20,8 +20,6 @@ from ..data import effect_version, fcurves, selection, strips
 from ..output.baked_film import Film
 from . import add_effect, match_source
 
-_LOOK = ("blend_type", "blend_alpha")
-
 
 def check(scene: Scene, strip: Strip) -> None:
     """Check that a baked strip could replace an effect strip.
@@ -62,8 +60,7 @@ def lay(scene: Scene, strip: Strip, film: Film) -> Strip:
     add_effect.copy_look(strip, baked, keys=True)
     if baked.color_multiply == strips.IN_CODE_VALUES:  # films do not need it
         baked.color_multiply = 1
-    for look in _LOOK:
-        setattr(baked, look, getattr(strip, look))
+    baked.blend_type, baked.blend_alpha = strip.blend_type, strip.blend_alpha
     alpha = [f"{each.path_from_id()}.blend_alpha" for each in (strip, baked)]
     fcurves.copy_curves(scene, alpha[0], scene, alpha[1])
     match_source.append_modifiers(scene, strip, baked)

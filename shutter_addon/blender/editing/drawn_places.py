@@ -11,8 +11,7 @@ from ...core.model.effect import Drawings
 from ...core.model.motions import Placement
 from ..data import snapshot, strips
 from ..data.sampled import Sampling
-from . import outline_drawings, region_edits
-from .motion_keys import MotionKeys
+from . import motion_keys, outline_drawings
 
 
 def hold(effect: PropertyGroup, index: int) -> None:
@@ -40,9 +39,9 @@ def begin(effect: PropertyGroup, strip: Strip, index: int, *, erases: bool = Fal
     is_elsewhere = any(origin != here for origin in origins.values())
     if origins.get(frame, here) != here or (erases and is_elsewhere and frame not in origins):
         outline_drawings.draw(effect, strip, region, shown.at(frame).strokes, frame)
-    if MotionKeys(effect, index, region.motion).are_made():
+    if motion_keys.MotionKeys(effect, index, region.motion).are_made():
         with suppress(EffectError):  # with locked curves, tracking stops, too
-            region_edits.key_region(effect, index)
+            motion_keys.insert(effect, index)
     _note(effect, region, {**origins, frame: here})
 
 

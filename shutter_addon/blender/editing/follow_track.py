@@ -23,7 +23,7 @@ from .motion_keys import MotionKeys
 
 Motions = dict[int, Similarity]  # motion of the picture to each frame
 Points = dict[str, complex]  # positions of markers in pixels, as in motions.Similarity
-Markers = list[tuple[str, np.ndarray, np.ndarray]]  # see _markers
+Point = tuple[str, np.ndarray, np.ndarray]  # see _markers
 
 
 def follow(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> None:
@@ -48,7 +48,7 @@ def follow(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> Non
     region.stops.clear()
 
 
-def _markers(region: PropertyGroup) -> Markers:
+def _markers(region: PropertyGroup) -> list[Point]:
     """Return name, frames (n,) and places (n, 2) of each point that a region follows.
 
     Frames are the clip's, ascending, and places are fractions of the picture.
@@ -74,21 +74,20 @@ def _missing(clip: MovieClip, name: str) -> EffectError:
     return EffectError(rpt_('clip "{clip}" has no track "{track}"').format(clip=clip.name, track=name))
 
 
-def _track_markers(track: MovieTrackingTrack) -> tuple[str, np.ndarray, np.ndarray]:
-    frames, shown = _marker_frames(track.markers)
-    places = fcurves.numbers(track.markers, "co", size=2)[shown]
-    return track.name, frames[shown], places + np.array(track.offset, np.float32)
+def _track_markers(track: MovieTrackingTrack) -> Point:
+    places = fcurves.numbers(track.markers, "co", size=2) + np.array(track.offset, np.float32)
+    return _shown(track.name, track.markers, places)
 
 
-def _corners(plane: bpy.types.MovieTrackingPlaneTrack) -> Markers:
-    frames, shown = _marker_frames(plane.markers)
+def _corners(plane: bpy.types.MovieTrackingPlaneTrack) -> list[Point]:
     places = np.array([[tuple(corner) for corner in marker.corners] for marker in plane.markers], np.float32)
-    return [(str(k), frames[shown], places[shown, k]) for k in range(4)]
+    return [_shown(str(k), plane.markers, places[:, k]) for k in range(4)]
 
 
-def _marker_frames(markers: bpy.types.MovieTrackingMarkers) -> tuple[np.ndarray, np.ndarray]:
-    """Return the frames (n,) of markers, ascending, and which of them are not muted."""
-    return fcurves.numbers(markers, "frame", np.int32), ~fcurves.numbers(markers, "mute", bool)
+def _shown(name: str, markers: bpy.types.bpy_prop_collection, places: np.ndarray) -> Point:
+    """Return a point without its muted markers."""
+    is_shown = ~fcurves.numbers(markers, "mute", bool)
+    return name, fcurves.numbers(markers, "frame", np.int32)[is_shown], places[is_shown]
 
 
 def _points(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, start: int) -> dict[int, Points]:
@@ -130,7 +129,7 @@ def _clip_times(scene: Scene, effect: PropertyGroup, strip: Strip, clip: MovieCl
         return {frame: clip.shown(frame).source_frame / clip.step + first for frame in frames}
 
 
-def _points_by_frame(tracks: Markers, times: dict[int, float], size: tuple[int, int]) -> dict[int, Points]:
+def _points_by_frame(tracks: list[Point], times: dict[int, float], size: tuple[int, int]) -> dict[int, Points]:
     """Return the markers that exist at each frame's time. Frames without any are left out."""
     by_frame = {}
     for frame, time in times.items():

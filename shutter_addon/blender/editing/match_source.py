@@ -96,14 +96,11 @@ def _values(strip: Strip, name: str) -> list:
 
 
 def _keyed(curves: list[FCurve], path: str) -> list:
-    return sorted(
-        (
-            (curve.data_path.removeprefix(path), curve.array_index, curve.extrapolation),
-            [(*key.handle_left, *key.co, *key.handle_right, key.interpolation) for key in curve.keyframe_points],
-        )
-        for curve in curves
-        if curve.data_path.startswith(path)
-    )
+    found = []
+    for curve in (curve for curve in curves if curve.data_path.startswith(path)):
+        keys = [(*key.handle_left, *key.co, *key.handle_right, key.interpolation) for key in curve.keyframe_points]
+        found.append((curve.data_path.removeprefix(path), curve.array_index, curve.extrapolation, keys))
+    return sorted(found)
 
 
 def _goal(effect: PropertyGroup, strip: Strip, source: Strip) -> tuple[int, int, Strip | None]:

@@ -153,10 +153,8 @@ def next_needed(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -
     drawn = [] if is_subject else [number for number, _curves in file.drawings]
     with closing(file.open()) as mattes:
         known = {frame: mattes.confidence(number) for frame, number in shown.items() if number not in drawn}
-    if is_subject:  # its mattes may not all be made
-        sure = {frame: share for frame, share in known.items() if share is not None}
-    else:  # too far from any drawing
-        sure = {frame: share or 0.0 for frame, share in known.items()}
+    # Not all mattes of a subject may be made. Frames of an outline without one are too far from any drawing.
+    sure = {frame: share or 0.0 for frame, share in known.items() if not (is_subject and share is None)}
     enough = SURE_SUBJECT if is_subject else SURE
     least = min(sure.values(), default=enough)
     if least >= enough:

@@ -8,7 +8,6 @@ from ...core.model import limits
 from ..data import fcurves, selection, strips
 from ..data.annotations import LAYERS, NOT_THIS, annotation, layer_of, layers_of
 from ..data.consistency import bars, choose_region, color_layers, forget_followed, unique
-from . import motion_keys
 
 
 def why_full(effect: PropertyGroup, *, regions: int = 0, shutters: int = 0) -> str | None:
@@ -109,12 +108,3 @@ def assign_region(effect: PropertyGroup, index: int, shutter: PropertyGroup) -> 
     color_layers(effect, shutter)
     effect.active_region = index
     effect.active_shutter = list(effect.shutters).index(shutter)
-
-
-def key_region(effect: PropertyGroup, index: int) -> None:
-    """Insert keyframes for a region's transform at the current frame.
-
-    Raises:
-        EffectError: it cannot be keyed.
-    """
-    motion_keys.insert(effect, index)

@@ -28,7 +28,6 @@ FRAMES = 3  # least window: the shown frame and those beside it
 LEAST = 0.02  # fraction of a frame: shorter readouts count as none
 # Rotation of the ramp in degrees. What is read first lies at its end, which is shown from later.
 _TURNS = {"TOP": 90, "BOTTOM": -90, "LEFT": 180, "RIGHT": 0}
-_OPPOSITE = {"TOP": "BOTTOM", "BOTTOM": "TOP", "LEFT": "RIGHT", "RIGHT": "LEFT"}
 
 
 class Repair(NamedTuple):
@@ -117,11 +116,11 @@ def _is_backward(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
     return bool(source_media.timing_of(strips.source_of(scene, effect, strip)).use_reverse_frames)
 
 
-def find(scene: Scene, effect: PropertyGroup, strip: Strip, side: str) -> tuple[float, str]:
+def find(scene: Scene, effect: PropertyGroup, strip: Strip, *, columns: bool) -> tuple[float, str]:
     """Find the readout of a source around the current frame, and the side that is read first.
 
     Args:
-        side: any side of the direction in which the sensor reads.
+        columns: whether the sensor reads column by column.
 
     Raises:
         EffectError: there is none, or it cannot be found.
@@ -135,11 +134,11 @@ def find(scene: Scene, effect: PropertyGroup, strip: Strip, side: str) -> tuple[
         shot = medium.around(index, low, high - 1)
         frames = range(max(low, shot.start), min(high, shot.stop))
         try:
-            found = readout.of_source(medium, frames, columns=side in ("LEFT", "RIGHT"))
+            found = readout.of_source(medium, frames, columns=columns)
         except readout.ReadoutError as error:
             sentence = rpt_("the readout cannot be found here: {why}")
             raise EffectError(sentence.format(why=rpt_(str(error)))) from None
     if abs(found) < LEAST:
         raise EffectError(rpt_("moving lines stay upright: there is no rolling shutter to repair"))
-    first = "TOP" if side in ("TOP", "BOTTOM") else "LEFT"
-    return found, first if found > 0 else _OPPOSITE[first]
+    sides = ("LEFT", "RIGHT") if columns else ("TOP", "BOTTOM")
+    return found, sides[found < 0]

@@ -123,10 +123,8 @@ def track(
     here = Tracked(frame=start, placement=placement_now(moving), confidence=1.0)
     shape, follow = _subject(scene, effect, strip, index, frames, here)
     tracked, stops = {start: here}, []
-    reach = (
-        max((a for a in anchors if a < start), default=frames[0]),
-        min((a for a in anchors if a > start), default=frames[-1]),
-    )
+    before, after = [anchor for anchor in anchors if anchor < start], [anchor for anchor in anchors if anchor > start]
+    reach = max(before, default=frames[0]), min(after, default=frames[-1])
     shown, target = snapshot.take(scene, effect, strip, frames), Target.of(effect, index)
     del scene, effect, strip, keys, moving  # these may become invalid after the first step
     with effect_source.open_source(shown) as source:

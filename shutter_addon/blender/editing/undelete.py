@@ -16,6 +16,8 @@ from . import add_effect, match_source
 _MOST = 64
 _COPIED = "copied"  # key of the copied effect
 _OWN = {"name", "identity", "source", "start"}  # properties of an effect that pasting keeps
+# What `new` of a collection needs of an item.
+_NEW: dict[str, tuple[str, ...]] = {"frames": ("frame_number",), "modifiers": ("type",), "strokes": ()}
 _effects: Kept[str, dict] = Kept()
 
 
@@ -119,12 +121,8 @@ def _fill(struct: bpy_struct, plain: dict) -> None:
 
 
 def _add(collection: bpy_prop_collection, name: str, item: dict) -> bpy_struct:
-    if name == "frames":
-        return collection.new(item["frame_number"])
-    if name == "modifiers":
-        return collection.new(item["type"])
-    if name == "strokes":
-        return collection.new()
+    if name in _NEW:
+        return collection.new(*(item[key] for key in _NEW[name]))
     if name in ("points", "keyframe_points"):
         collection.add(1)
         return collection[-1]

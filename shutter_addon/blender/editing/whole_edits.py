@@ -88,11 +88,6 @@ def paths_relative(scene: Scene, folder: Path) -> AbstractContextManager[None]:
     return for_a_while(relative)
 
 
-def is_saved(path: Path) -> bool:
-    """Return whether a path is a .blend file."""
-    return path.suffix.lower() == ".blend"
-
-
 def open_edit(path: Path, name: str | None = None) -> Scene:
     """Open a .blend file without running its scripts, and return its scene of this name, or its active scene.
 
@@ -129,8 +124,7 @@ def _scripts(scene: Scene) -> list[tuple]:
     """Return (owner, driver) of each driver that needs scripts, among the data that the edit renders."""
     used = requirements.used_data(scene, range(scene.frame_start, scene.frame_end + 1))
     drivers = [(item, curve.driver) for item in used for curve in _driven(item)]
-    scripted = ((owner, driver) for owner, driver in drivers if driver.type == "SCRIPTED")
-    complex_ones = [(owner, driver) for owner, driver in scripted if not driver.is_simple_expression]
+    complex_ones = [pair for pair in drivers if pair[1].type == "SCRIPTED" and not pair[1].is_simple_expression]
     if complex_ones:  # evaluation finds out which of them are valid
         with film_output.quiet():
             for other in used.intersection(bpy.data.scenes):

@@ -15,7 +15,7 @@ from ..devices import main_thread
 from ..editing import baked_strips
 from ..output import baked_film, film_output
 from .operator_bases import operator, redraw
-from .panel_parts import draw_progress, sentence
+from .panel_parts import sentence
 
 TICK = 0.5  # seconds between two looks at the job
 STILL = 1.0  # seconds before the panel asks again whether the bake is outdated
@@ -130,7 +130,7 @@ def stop() -> None:
 
 
 def forget() -> None:
-    """Stop and forget errors, before another file is loaded."""
+    """Stop and forget errors, before another file is loaded or the extension is disabled."""
     stop()
     _bake.failure = "", ""
 
@@ -139,7 +139,9 @@ def draw_panel(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Str
     job = _bake.running
     if job is not None and job.effect == effect.identity:
         row = layout.row(align=True)
-        draw_progress(row, job.done(), len(job.film.frames))
+        done, total = job.done(), len(job.film.frames)
+        text = iface_("{done} of {total}").format(done=done, total=total)
+        row.progress(factor=done / total, text=text, translate=False)
         row.operator("shutter.bake_stop", text="", icon="X")
         return
     baked, failure = _bake.failure
@@ -169,6 +171,3 @@ def _ask_whether_stale() -> None:
     if (active := selection.active(bpy.context)) is not None:
         baked_strips.is_stale(*active)
         redraw(bpy.context)
-
-
-unregister = forget

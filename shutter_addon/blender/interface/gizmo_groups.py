@@ -14,12 +14,16 @@ from .operator_bases import Mixin
 TWEAK = ("gizmogroup.gizmo_tweak", "LEFTMOUSE", "PRESS", {"any": True})
 
 
-class Seen(Mixin):
-    """A gizmo that is drawn and clickable while it has something to show.
+class Dragged(Mixin):
+    """A gizmo that is drawn and can be dragged while it has something to show.
 
-    Subclasses have `seen(context)`, which returns what to draw or None; `show(context, seen)`, which draws it; and
-    `is_at(context, seen, location)`, which tells whether a point of the region hits it.
+    Subclasses have `seen(context)`, which returns what to draw or None; `show(context, seen)`, which draws it;
+    `is_at(context, seen, location)`, which tells whether a point of the region hits it; `grab(context, event, seen)`,
+    which begins to drag; and `drag(context, event, tweak)`, which follows the pointer.
     """
+
+    def setup(self) -> None:
+        self.use_draw_modal = True
 
     def draw(self, context: Context) -> None:
         if (seen := self.seen(context)) is not None:
@@ -28,17 +32,6 @@ class Seen(Mixin):
     def test_select(self, context: Context, location: tuple[int, int]) -> int:
         seen = self.seen(context)
         return 0 if seen is not None and self.is_at(context, seen, location) else -1
-
-
-class Dragged(Seen):
-    """A gizmo that can be dragged, and is drawn during that.
-
-    Subclasses have `grab(context, event, seen)`, which begins, and `drag(context, event, tweak)`, which follows the
-    pointer.
-    """
-
-    def setup(self) -> None:
-        self.use_draw_modal = True
 
     def invoke(self, context: Context, event: Event) -> set[str]:
         if (seen := self.seen(context)) is None:  # it may disappear during playback
@@ -52,7 +45,10 @@ class Dragged(Seen):
 
 
 class InPreview(Mixin):
-    """A gizmo group in previews, with one gizmo."""
+    """A gizmo group in previews, with one gizmo.
+
+    Subclasses have `is_wanted(live)`, which tells whether to show it with these settings of the live preview.
+    """
 
     bl_space_type = "SEQUENCE_EDITOR"
     bl_region_type = "PREVIEW"
@@ -61,20 +57,15 @@ class InPreview(Mixin):
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        """Show the group where the live preview shows an effect, if its setting `is_wanted`."""
         live = context.window_manager.virtual_shutter
         return live.live and cls.is_wanted(live) and preview_areas.shown(context) is not None
-
-    @classmethod
-    def is_wanted(cls, _live: PropertyGroup) -> bool:
-        return True
 
     def setup(self, _context: Context) -> None:
         self.gizmos.new(self.gizmo.__name__)
 
 
 class WithKeys(InPreview):
-    """A gizmo group with a keymap. It keeps Blender's own key for annotating.
+    """A gizmo group with a keymap and a `poll` of its own. It keeps Blender's own key for annotating.
 
     Attributes:
         shortcuts: operator, type and value of the event, and other arguments of Blender's keymap items.

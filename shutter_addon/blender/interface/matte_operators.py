@@ -184,7 +184,7 @@ _READS = EnumProperty(
 @operator("Find Readout", _why_no_repair, icon="VIEWZOOM", reads=_READS)
 def find_readout(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Find the sensor's readout time from lines that lean while they move around the current frame, and repair it"""
-    found, side = rolling_shutter.find(self.edit, effect, self.effect_strip, "TOP" if self.reads == "ROWS" else "LEFT")
+    found, side = rolling_shutter.find(self.edit, effect, self.effect_strip, columns=self.reads == "COLUMNS")
     rolling_shutter.repair(self.edit, effect, self.effect_strip, min(abs(found), 1.0), side)
     name = next(name for word, name, _ in SIDES if word == side)
     percent = round(100 * abs(found))

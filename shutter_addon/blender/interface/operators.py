@@ -23,18 +23,7 @@ from ..output import error_report, matte_export
 from . import needs, sharp_frame
 from .bar_editor import bar_under
 from .matte_operators import STRIP
-from .operator_bases import (
-    UNDOABLE,
-    Mixin,
-    Named,
-    OfEffect,
-    chosen_file,
-    given,
-    kept,
-    operator,
-    redraw,
-    report,
-)
+from .operator_bases import UNDOABLE, Mixin, Named, OfEffect, chosen_file, given, kept, operator, redraw, report
 from .panel_parts import draw_properties, icon_of
 
 
@@ -260,10 +249,10 @@ class SHUTTER_OT_draw(MakesEffect, OfEffect, Operator):
         if self.new or region is None or region.kind in strips.MATTES:
             if sentence := region_edits.why_full(effect, regions=1):  # poll() does not know the value of `new`
                 raise EffectError(sentence)
-            region = region_edits.first_drawn(effect, selection.active_shutter(effect), self.kind)
+            region_edits.first_drawn(effect, selection.active_shutter(effect), self.kind)
         drawn_places.begin(effect, self.effect_strip, effect.active_region)
         layer = "not_layer" if self.not_this else "layer"
-        if not drawing_tool(context, effect, region, "builtin.annotate", layer):
+        if not drawing_tool(context, effect, "builtin.annotate", layer):
             self.report({"INFO"}, "Open a sequencer with a preview to draw")
         sharp_frame.show(context)
 
@@ -272,14 +261,12 @@ class SHUTTER_OT_draw(MakesEffect, OfEffect, Operator):
 def erase(self: Operator, context: Context, effect: PropertyGroup) -> None:
     """Erase strokes of the active region in the preview"""
     drawn_places.begin(effect, self.effect_strip, effect.active_region, erases=True)
-    if not drawing_tool(context, effect, selection.active_region(effect), "builtin.annotate_eraser"):
+    if not drawing_tool(context, effect, "builtin.annotate_eraser"):
         self.report({"INFO"}, "Open a sequencer with a preview to erase")
 
 
-def drawing_tool(
-    context: Context, effect: PropertyGroup, region: PropertyGroup, tool: str, layer: str = "layer"
-) -> bool:
-    """Make a layer of the region the active annotation and activate a drawing tool in all previews.
+def drawing_tool(context: Context, effect: PropertyGroup, tool: str, layer: str = "layer") -> bool:
+    """Make a layer of the active region the active annotation and activate a drawing tool in all previews.
 
     Args:
         layer: one of annotations.LAYERS.
@@ -287,6 +274,7 @@ def drawing_tool(
     Returns:
         Whether there is a preview.
     """
+    region = selection.active_region(effect)
     if annotations.layer_of(effect, region, layer) is None:
         region_edits.new_layer(effect, region, layer)
     consistency.aim_pen(effect, layer)
@@ -322,12 +310,6 @@ def region_move(self: Operator, _context: Context, effect: PropertyGroup) -> set
     name = selection.active_shutter(effect).name
     places = [i for i, region in enumerate(effect.regions) if region.shutter == name]
     return _move(places, effect.active_region, self.direction, partial(region_edits.move_region, effect))
-
-
-@operator("Insert Region Keyframes", needs.a_region, icon="KEY_HLT")
-def region_key(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
-    """Insert keyframes for location, rotation and scale of the active region at the current frame"""
-    region_edits.key_region(effect, effect.active_region)
 
 
 @operator("Choose Source", icon="SEQUENCE", strip=STRIP)

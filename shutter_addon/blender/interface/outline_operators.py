@@ -1,4 +1,4 @@
-"""Operators and the gizmo of outlines: track, correct, and find where a drawing is needed."""
+"""Operators and the gizmo of outlines and subjects: find, track, correct, and go to where a drawing is needed."""
 
 from contextlib import closing
 
@@ -12,12 +12,11 @@ from bpy.types import Context, Event, Gizmo, GizmoGroup, Operator, PropertyGroup
 from ...core.messages import UserError
 from ...core.model import outlines
 from ..data import selection, strips
-from ..editing import outline_drawings, track_region
-from ..rendering import outline_carrying
+from ..editing import outline_drawings, subjects, track_region
+from ..rendering import outline_carrying, previews
 from . import drawing, needs
 from .gizmo_groups import Dragged, View, WithKeys, view
 from .operator_bases import Beside, OfEffect, operator, redraw, report, show_status
-from .preview import show_carried
 from .region_gizmo import SHUTTER_GGT_region
 
 _COLOR = (0.2, 0.9, 1.0, 0.9)
@@ -46,7 +45,7 @@ class SHUTTER_OT_outline_needed(Beside, OfEffect, Operator):
         if waits or not frames:
             return self._go(context)
         self._file = file
-        outline_carrying.carry(file, frames, show_carried, shown.get(scene.frame_current))
+        outline_carrying.carry(file, frames, previews.show_carried, shown.get(scene.frame_current))
         return self.go_on(context)
 
     def goes_on(self, _context: Context) -> bool:
@@ -59,7 +58,7 @@ class SHUTTER_OT_outline_needed(Beside, OfEffect, Operator):
     def end(self, context: Context, is_stopped: bool) -> set[str] | None:
         if is_stopped or self._target.effect() is None:
             outline_carrying.stop()
-            show_carried()
+            previews.show_carried()
             return {"CANCELLED"}
         if (failure := outline_carrying.failure(self._file)) is not None:
             raise UserError(failure)
@@ -96,6 +95,30 @@ def outline_it(self: Operator, _context: Context, effect: PropertyGroup) -> set[
     """Make the active region an outline of the subject that its strokes mark or enclose at this frame"""
     if not outline_drawings.outline_it(self.edit, effect, self.effect_strip, effect.active_region):
         report(self, rpt_("No subject stands out from its surroundings"))
+        return {"CANCELLED"}
+    return None
+
+
+@operator("Find Subject", needs.strokes, only_seen=True)
+def subject_find(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
+    """Make the active region a subject, which a model finds under its strokes at this frame and follows"""
+    if not subjects.find(self.edit, effect, self.effect_strip, effect.active_region):
+        report(self, rpt_("The model finds no subject under the stroke: draw along its middle, or outline it"))
+        return {"CANCELLED"}
+    return None
+
+
+@operator("Scribble", needs.a_subject, icon="IPO_LINEAR")
+def subject_scribble(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
+    """Make the active subject a scribble: its strokes, as wide as the region's width"""
+    effect.regions[effect.active_region].kind = "LINE"
+
+
+@operator("Outline", needs.a_subject, icon="CURVE_BEZCIRCLE", only_seen=True)
+def subject_outline(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
+    """Make the active subject an outline, which is drawn where the subject has strokes"""
+    if not subjects.to_outline(self.edit, effect, self.effect_strip, effect.active_region):
+        report(self, rpt_("The subject has no outline there"))
         return {"CANCELLED"}
     return None
 

@@ -6,13 +6,10 @@ from typing import Any
 
 import bpy.utils.previews
 import numpy as np
-from bpy.app.translations import pgettext_iface as iface_
-from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import Context, Menu, Panel, PropertyGroup, Scene, Strip, UILayout
 from bpy.utils.previews import ImagePreviewCollection
 
 from ...core.model import shutters
-from ...core.model.fields import fields_of
 from ...core.pixels import patterns
 from ..data import selection
 from . import drawing
@@ -37,10 +34,8 @@ def sentence(layout: UILayout, words: str, icon: str = "NONE", room: float = 1.0
         is_quiet: draw it greyed out.
     """
     unit, region = drawing.ui_scale(), bpy.context.region
-    width = (
-        room * min(region.width if region else 300 * unit, WIDEST * unit)
-        - (_MARGIN + (_ICON if icon != "NONE" else 0)) * unit
-    )
+    beside = _MARGIN if icon == "NONE" else _MARGIN + _ICON
+    width = room * min(region.width if region else 300 * unit, WIDEST * unit) - beside * unit
     column = layout.column(align=True)
     column.active = not is_quiet
     for i, line in enumerate(drawing.wrapped(words, width)):
@@ -49,44 +44,24 @@ def sentence(layout: UILayout, words: str, icon: str = "NONE", room: float = 1.0
         row.label(text=line, icon=icon if i == 0 or icon == "NONE" else "BLANK1", translate=False)
 
 
-def too_few_frames(step: float) -> str:
-    """Return a note about an exposure that shows copies.
+def draw_list(layout: UILayout, effect: PropertyGroup, kind: str, items: Sequence[PropertyGroup]) -> None:
+    """Draw the list of shutters or regions with its buttons.
 
     Args:
-        step: pixels from one exposed frame to the next.
+        kind: "shutter" or "region".
+        items: those that the list shows.
     """
-    return rpt_("Too few frames: steps of {pixels} pixels").format(pixels=f"{step:.0f}")
-
-
-def draw_fields(layout: UILayout, owner: PropertyGroup, kind: type) -> None:
-    """Draw the properties whose field (core.model.fields) has `shown`."""
-    for field in fields_of(kind).values():
-        if field.shown:
-            layout.prop(owner, field.blender)
-
-
-def draw_list(
-    layout: UILayout, effect: PropertyGroup, kind: str, items: Sequence[PropertyGroup], menu: str | None = None
-) -> None:
-    """Draw the list of shutters or regions with its buttons."""
     row = layout.row()
-    row.template_list(
-        f"SHUTTER_UL_{kind}s",
-        "",
-        effect,
-        f"{kind}s",
-        effect,
-        f"active_{kind}",
-        rows=min(max(len(items), 1), _MOST_ROWS),
-    )
+    rows = min(max(len(items), 1), _MOST_ROWS)
+    row.template_list(f"SHUTTER_UL_{kind}s", "", effect, f"{kind}s", effect, f"active_{kind}", rows=rows)
     column = row.column(align=True)
     if kind == "shutter":
         column.operator("shutter.shutter_add", text="", icon="ADD")
     else:
         column.operator("shutter.draw", text="", icon="ADD").new = True
     column.operator(f"shutter.{kind}_remove", text="", icon="REMOVE")
-    if menu:
-        column.menu(menu, text="", icon="DOWNARROW_HLT")
+    if kind == "shutter":
+        column.menu("SHUTTER_MT_shutters", text="", icon="DOWNARROW_HLT")
     elif len(items) > 1:
         for direction, icon in (("UP", "TRIA_UP"), ("DOWN", "TRIA_DOWN")):
             column.operator(f"shutter.{kind}_move", text="", icon=icon).direction = direction
@@ -111,11 +86,6 @@ def draw_operators(layout: UILayout, *names: str) -> None:
 def draw_properties(layout: UILayout, owner: bpy.types.bpy_struct, *names: str) -> None:
     for name in names:
         layout.prop(owner, name)
-
-
-def draw_progress(layout: UILayout, done: int, total: int) -> None:
-    text = iface_("{done} of {total}").format(done=done, total=total)
-    layout.progress(factor=done / max(total, 1), text=text, translate=False)
 
 
 def panel(

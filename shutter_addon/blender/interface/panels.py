@@ -10,22 +10,12 @@ from ...core.messages import EffectError
 from ...core.model import shutters
 from ...core.model.choices import CONTEXT
 from ...core.model.effect import Shutter
+from ...core.model.fields import fields_of
 from ..data import annotations, consistency, data_format, selection, strips
 from ..editing import bar_edits, match_source
 from ..rendering import strobing
 from . import bake_operators, region_panels
-from .panel_parts import (
-    WIDEST,
-    draw_fields,
-    draw_list,
-    draw_operators,
-    draw_properties,
-    menu,
-    panel,
-    pattern_icon,
-    sentence,
-    too_few_frames,
-)
+from .panel_parts import WIDEST, draw_list, draw_operators, draw_properties, menu, panel, pattern_icon, sentence
 
 
 class SHUTTER_UL_shutters(UIList):
@@ -118,7 +108,7 @@ class SEQUENCER_PT_shutter(Panel):
         effect = active[1]
         _draw_live(layout, context)
         _draw_source(layout, effect)
-        draw_list(layout, effect, "shutter", effect.shutters, "SHUTTER_MT_shutters")
+        draw_list(layout, effect, "shutter", effect.shutters)
         row = layout.row(align=True)
         draw_operators(row, "draw")
         region = selection.active_region(effect)
@@ -155,7 +145,7 @@ def _draw_exposure(layout: UILayout, scene: Scene, effect: PropertyGroup, strip:
     if shutter.length == "MOTION" and shutter.follow != "NOTHING":
         layout.prop(shutter, "trail")
     _draw_combine(layout, shutter)
-    draw_fields(layout, shutter, Shutter)
+    draw_properties(layout, shutter, *(field.blender for field in fields_of(Shutter).values() if field.shown))
     draw_operators(layout, "tripod")
     _draw_bars(layout, scene, effect, strip)
 
@@ -231,7 +221,7 @@ def _notes(context: Context) -> Iterator[tuple[str, str]]:
             words = iface_("The effect does not use effect strips of the source: make the Shutter strip their input")
             yield words, ""
     if (step := strobing.last(effect)) is not None:
-        yield too_few_frames(step), "shutter.smooth_streaks"
+        yield strobing.too_few_frames(step), "shutter.smooth_streaks"
 
 
 def _tracked(effect: PropertyGroup) -> list[int | None]:

@@ -26,20 +26,10 @@ from ..data.properties import with_fields
 from ..data.snapshot import Snapshot
 from ..devices import blender_gpu, main_thread
 from ..editing import shown_annotations
-from ..rendering import (
-    effect_source,
-    invalidation,
-    outline_carrying,
-    pictures,
-    previews,
-    render_job,
-    sessions,
-    strobing,
-)
+from ..rendering import effect_source, invalidation, outline_carrying, pictures, previews, render_job, strobing
 from ..rendering.previews import Decision, Drawing
 from . import drawing, sharp_frame
 from .drawing import Quad
-from .panel_parts import too_few_frames
 
 VIEWS = (
     ("RESULT", "Result", "The finished picture"),
@@ -238,7 +228,7 @@ def _tell_detail(wanted: Drawing, size: tuple[int, int], say: Say) -> None:
 def _tell_strobing(known: float | None, is_new: bool, say: Say) -> None:
     """Add a note about too few frames, as strobing.look returns it."""
     if known is not None:
-        say(too_few_frames(known))
+        say(strobing.too_few_frames(known))
     if is_new:
         main_thread.later(preview_areas.redraw_panels)  # panels may have been drawn before
     if strobing.is_busy():
@@ -265,19 +255,12 @@ def _show_sharp(context: Context, shown: Shown | None) -> None:
 
 def _tell_carrying(say: Say) -> None:
     """Track missing mattes of outlines, and add a note on the progress."""
-    fault, progress = outline_carrying.begin(show_carried), outline_carrying.progress()
+    fault, progress = outline_carrying.begin(previews.show_carried), outline_carrying.progress()
     if fault is not None:
         say(rpt_("Shutter: {fault}").format(fault=fault))
     if progress is not None:
         done, total = progress
         say(rpt_("Tracking the outline: {done} of {total} frames").format(done=done, total=total))
-
-
-def show_carried() -> None:
-    """Redraw previews with new mattes of outlines."""
-    sessions.WINDOW.keep(set())
-    invalidation.drop_frames()
-    preview_areas.redraw()
 
 
 def _show_strokes(context: Context, quad: Quad, shown: Shown, snapshot: Snapshot) -> None:

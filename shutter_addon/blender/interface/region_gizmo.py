@@ -12,8 +12,7 @@ from ...core import revision
 from ...core.messages import EffectError
 from ...core.model import scribbles
 from ..data import selection, snapshot, validation
-from ..editing import bar_edits, drawn_places, region_edits, track_region
-from ..editing.motion_keys import MotionKeys
+from ..editing import bar_edits, drawn_places, motion_keys, track_region
 from . import drawing
 from .gizmo_groups import TWEAK, Dragged, View, WithKeys, view
 from .operator_bases import popup
@@ -67,13 +66,8 @@ def place(context: Context) -> Place | None:
     middle = (low + high) / 2
     corner = high if region.kind == "RAMP" else np.maximum(high, middle + _NEAREST)
     # The corner rotates about the middle of these points, so they include its mirror image.
-    ((_, moved, _),) = scribbles.transform(
-        [[2 * middle - corner, corner, middle]],
-        region.location,
-        np.degrees(region.rotation),
-        region.scale,
-        seen_as.aspect,
-    )
+    numbers = region.location, np.degrees(region.rotation), region.scale
+    ((_, moved, _),) = scribbles.transform([[2 * middle - corner, corner, middle]], *numbers, seen_as.aspect)
     centre, corner = seen_as.on_region([middle + np.array(region.location), moved])
     return Place(centre, corner, seen_as)
 
@@ -147,9 +141,9 @@ class SHUTTER_GT_region(Dragged, Gizmo):
         if cancel:
             region.location, region.rotation, region.scale = self.before
             return
-        if bar_edits.auto_key(context) or MotionKeys(effect, index, region.motion).are_made():
+        if bar_edits.auto_key(context) or motion_keys.MotionKeys(effect, index, region.motion).are_made():
             try:
-                region_edits.key_region(effect, index)
+                motion_keys.insert(effect, index)
             except EffectError as error:  # gizmos have no reports
                 popup(context, str(error), icon="ERROR")
             context.area.tag_redraw()  # panels show whether it is keyed

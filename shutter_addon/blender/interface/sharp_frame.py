@@ -1,18 +1,24 @@
 """Show the source frame in the previews while the user draws: Blender's own picture, by its channel.
 
 It appears with *Draw* until the stroke is finished, and whenever the pen is down, because our draw handler would cover
-the stroke. The display channel is saved in files, so it is reset before saving.
+the stroke. The display channel is saved in files, so it is reset before saving. After the first stroke of a new effect,
+a subject is looked for under it.
 """
 
 from dataclasses import dataclass
 
 import bpy
+from bpy.app.translations import contexts
+from bpy.app.translations import pgettext_iface as iface_
 from bpy.types import Context, SpaceSequenceEditor
 
-from ..data import preview_areas, selection, strips
+from ...core.messages import UserError
+from ..data import consistency, preview_areas, selection, strips
 from ..devices import main_thread
+from ..editing import subjects
+from ..rendering.effect_source import FAULTS
 from ..rendering.previews import pen_is_down
-from . import subject_operators
+from .operator_bases import popup, redraw
 
 _TOOLS = "builtin.annotate"  # prefix of the tools' names
 
@@ -76,7 +82,7 @@ def give_back(context: Context) -> None:
 
 
 def forget() -> None:
-    """Forget the pen before another file is loaded."""
+    """Forget the pen before another file is loaded or the extension is disabled."""
     give_back(bpy.context)
     _pen.tool = ""
 
@@ -113,7 +119,27 @@ def _lay_down() -> None:
         give_back(bpy.context)
         if _pen.tool:
             _choose(bpy.context, _pen.tool)
-        subject_operators.pen_is_up(bpy.context)
+        _find_subject(bpy.context)
+
+
+def _find_subject(context: Context) -> None:
+    """Look for a subject under the first stroke of a new effect; the pen draws on the subject from now on."""
+    seen = selection.in_picture(context)
+    region = selection.active_region(seen[1]) if seen else None
+    if region is None:
+        return
+    scene, effect, strip = seen
+    consistency.aim_pen(effect)
+    if not subjects.is_first_stroke(effect, region):
+        return
+    try:
+        is_found = subjects.find(scene, effect, strip, effect.active_region)
+    except (*FAULTS, UserError) as error:
+        popup(context, str(error), icon="ERROR")
+        return
+    if is_found:
+        bpy.ops.ed.undo_push(message=iface_("Find Subject", contexts.operator_default))
+        redraw(context)
 
 
 _OWNER = object()  # of the message bus subscription
@@ -131,4 +157,3 @@ register = listen
 
 def unregister() -> None:
     bpy.msgbus.clear_by_owner(_OWNER)
-    give_back(bpy.context)

@@ -1,4 +1,4 @@
-"""Operators that track the region or the camera, follow movie clips, and use tracks for layers and exposures."""
+"""Operators that key and track the region or the camera, and use tracks for layers and exposures."""
 
 import math
 import time
@@ -9,7 +9,7 @@ from bpy.types import Context, Operator, PropertyGroup
 
 from ...core.model.choices import CONTEXT
 from ..data import selection, validation
-from ..editing import bar_edits, follow_track, outline_drawings, shutter_edits, track_region
+from ..editing import bar_edits, follow_track, motion_keys, outline_drawings, shutter_edits, track_region
 from ..rendering.effect_source import FAULTS
 from . import needs
 from .operator_bases import Beside, OfEffect, given, operator, redraw, report, show_status
@@ -220,6 +220,12 @@ def track_look(self: Operator, _context: Context, effect: PropertyGroup) -> set[
 def track_camera_look(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
     """Go to the next frames with low tracking confidence of the camera"""
     return _look(self, effect, None)
+
+
+@operator("Insert Region Keyframes", needs.a_region, icon="KEY_HLT")
+def region_key(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
+    """Insert keyframes for location, rotation and scale of the active region at the current frame"""
+    motion_keys.insert(effect, effect.active_region)
 
 
 def _why_no_clip(effect: PropertyGroup) -> str | None:

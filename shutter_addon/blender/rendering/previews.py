@@ -291,6 +291,13 @@ def refine() -> None:
         smooth_previews.advance(_SLICE)
 
 
+def show_carried() -> None:
+    """Redraw previews with new mattes of outlines."""
+    sessions.WINDOW.keep(set())
+    invalidation.drop_frames()
+    preview_areas.redraw()
+
+
 def is_going(context: Context) -> bool:
     """Tell whether the film plays, or pictures may be late."""
     return _is_playing(context) or may_be_late()

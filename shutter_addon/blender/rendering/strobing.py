@@ -11,6 +11,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 
 import numpy as np
+from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import PropertyGroup
 
 from ...compute.renderer import Renderer
@@ -134,6 +135,15 @@ def advance() -> bool:
     if _measuring.wanted is not None:
         _measuring.job, _measuring.wanted = threads.start(_measure_motion, *_measuring.wanted), None
     return ended
+
+
+def too_few_frames(step: float) -> str:
+    """Return a note about an exposure that shows copies.
+
+    Args:
+        step: pixels from one exposed frame to the next.
+    """
+    return rpt_("Too few frames: steps of {pixels} pixels").format(pixels=f"{step:.0f}")
 
 
 def forget() -> None:
