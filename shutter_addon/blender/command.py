@@ -1,6 +1,7 @@
 """The command line: `python -m shutter_addon render …`, or `blender -c shutter render …` in an installed Blender.
 
-Each command is a module of commands/. Its `add` adds a parser, whose default `run` is the command's function.
+Each command is a module of commands/, with a sentence for `--help`, a function that adds its options, and one that runs
+it.
 """
 
 import argparse
@@ -56,6 +57,9 @@ def _refuse(reason: str, code: int = BAD_INPUT) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser("shutter", description="Every pixel its own exposure.")
     commands = parser.add_subparsers(dest="command", required=True)
-    for command in COMMANDS:
-        import_module(f".commands.{command}_command", __package__).add(commands)
+    for name in COMMANDS:
+        command = import_module(f".commands.{name}_command", __package__)
+        options = commands.add_parser(name, help=command.HELP)
+        command.add(options)
+        options.set_defaults(run=command.run)
     return parser

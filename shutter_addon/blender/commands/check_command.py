@@ -1,9 +1,8 @@
 """The command `check`: whether an edit can be rendered on this machine."""
 
-import argparse
 import re
 import sys
-from argparse import Namespace
+from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
 from pathlib import Path
 
@@ -19,9 +18,10 @@ from ..output import edit_check, error_report, film_join, film_output, shared_fr
 from ..rendering import render_job, render_settings
 from . import command_line
 
+HELP = "find out whether an edit can be rendered here"
 
-def add(commands: argparse._SubParsersAction) -> None:
-    parser = commands.add_parser("check", help="find out whether an edit can be rendered here")
+
+def add(parser: ArgumentParser) -> None:
     option, to_path = parser.add_argument, command_line.to_path
     option("edit", metavar="FILE.blend", type=to_path, help="a saved edit")
     option("--frames", metavar="A:B", help="timeline frames A to B (default: all of the edit)")
@@ -32,7 +32,6 @@ def add(commands: argparse._SubParsersAction) -> None:
     option("--movie", type=to_path, metavar="FILE", help=f"the movie that the frames will be joined to ({movies})")
     command_line.add_device(parser)
     option("--report", action="store_true", help="print a report for a bug report, without names")
-    parser.set_defaults(run=run)
 
 
 def run(arguments: Namespace) -> None:

@@ -1,7 +1,6 @@
 """The command `render`: a film of a source and a recipe, or of a saved edit, through Blender's sequencer."""
 
-import argparse
-from argparse import Namespace
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 import bpy
@@ -20,9 +19,10 @@ from ..output import film_output, shared_frames
 from ..rendering import render_settings
 from . import command_line
 
+HELP = "render a source through a recipe, or a saved edit"
 
-def add(commands: argparse._SubParsersAction) -> None:
-    parser = commands.add_parser("render", help="render a source through a recipe, or a saved edit")
+
+def add(parser: ArgumentParser) -> None:
     option, to_path = parser.add_argument, command_line.to_path
     option("source", type=to_path, help="a movie, the first file of an image sequence, or a saved edit (.blend)")
     option("--recipe", type=to_path, help="the effect, a JSON file; not for a saved edit")
@@ -33,7 +33,6 @@ def add(commands: argparse._SubParsersAction) -> None:
     command_line.add_device(parser)
     option("--weights", type=to_path, metavar="DIR", help="also write the mattes of the shutters, as float EXR")
     option("--save", type=to_path, metavar="FILE.blend", help="keep the edit")
-    parser.set_defaults(run=run)
 
 
 def run(arguments: Namespace) -> None:

@@ -1,8 +1,7 @@
 """The command `track`: keys for a region of a recipe, which follows what it covers, or for the camera."""
 
-import argparse
 import json
-from argparse import Namespace
+from argparse import ArgumentParser, Namespace
 from contextlib import ExitStack, closing
 from dataclasses import replace
 from typing import Any
@@ -26,9 +25,10 @@ from ..output import film_output
 from ..rendering import render_job
 from . import command_line
 
+HELP = "follow what a region covers, or the camera"
 
-def add(commands: argparse._SubParsersAction) -> None:
-    parser = commands.add_parser("track", help="follow what a region covers, or the camera")
+
+def add(parser: ArgumentParser) -> None:
     option, to_path = parser.add_argument, command_line.to_path
     option("source", type=to_path, help="a movie, or the first file of an image sequence")
     option("--recipe", type=to_path, required=True, help="the effect, a JSON file")
@@ -41,7 +41,6 @@ def add(commands: argparse._SubParsersAction) -> None:
     option("--hold", action="store_true", help="stay opaque where the track has ended: no keys of opacity")
     option("--output", type=to_path, required=True, metavar="R2.json", help="the recipe with the keys")
     option("--report", type=to_path, metavar="FILE.json", help="each frame's confidence, and where tracking ended")
-    parser.set_defaults(run=run)
 
 
 def run(arguments: Namespace) -> None:
