@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterator
-from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -100,7 +99,7 @@ def _check_footage(scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
     The effect's scene has the size of the footage then.
     """
     source = strips.source_of(scene, effect, strip)
-    with closing(source_media.open_media(source)) as medium:
+    with source_media.open_media(source) as medium:
         size = medium.width, medium.height
         saved = effect.scene.render.resolution_x, effect.scene.render.resolution_y
         if saved != size:
@@ -137,7 +136,7 @@ def _lacking_mattes(source: FrameSource, requests: list[Request], folders: set[P
             if isinstance(matte.content, FileFrame):
                 shown.setdefault(matte.content.file, set()).add((matte.content, request.index // source.step))
     for file, contents in shown.items():
-        with closing(file.open()) as medium:
+        with file.open() as medium:
             indices = {content.index(medium, index) for content, index in contents}
             indices = {min(max(index, 0), medium.count - 1) for index in indices}
             if not isinstance(medium, CarriedMattes):
