@@ -13,7 +13,7 @@ from ..core.messages import UserError
 from ..devices.device import NoDeviceError
 from ..media.files import check_name
 from .output import film_output
-from .rendering import render_job
+from .rendering import render_job, render_settings
 
 BAD_INPUT = 2
 PLACES = ("output", "save", "json", "source", "edit")  # options to name where an OSError names no file
@@ -28,7 +28,9 @@ def main(argv: list[str]) -> int:
         for path in vars(arguments).values():
             if isinstance(path, Path):
                 check_name(path)
-        arguments.run(arguments)
+        chosen = [getattr(arguments, name, None) for name in ("device", "weights", "gpu_memory")]
+        with render_settings.using(*chosen):
+            arguments.run(arguments)
     except SystemExit as stop:  # argparse, after --help or a message on stderr
         return int(stop.code or 0)
     except KeyboardInterrupt:  # between the frames of a render; finished ones stay

@@ -38,7 +38,7 @@ def run(arguments: Namespace) -> None:
     if arguments.attached:
         _check_parent(film)
     total, numbers = len(film.frames), itertools.count(1)
-    with command_line.using_device(arguments), film_output.progress(total, "frame") as moved:
+    with film_output.progress(total, "frame") as moved:
 
         def told() -> None:
             moved()

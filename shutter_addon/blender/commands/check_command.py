@@ -37,18 +37,17 @@ def add(parser: ArgumentParser) -> None:
 def run(arguments: Namespace) -> None:
     scene, frames = command_line.open_edit(arguments.edit, arguments.frames)
     version = versions.of_edit(scene)
-    with command_line.using_device(arguments):
-        device, notes, faults = _checked(arguments, scene, frames)
-        if arguments.output and not faults:
-            faults += _fault(film_output.make_folder, arguments.output)
-            faults += _fault(job_file.write, arguments.output, version)
-        lines = [
-            f"Edit: {arguments.edit}, version {version.key}",
-            "Frames: {} to {}, {}×{}".format(frames[0], frames[-1], *film_output.size(scene)),
-            f"Device: {device}",
-            *[f"Note: {note}" for note in notes],
-        ]
-        command_line.print_line(error_report.text(scene) if arguments.report else "\n".join(lines))
+    device, notes, faults = _checked(arguments, scene, frames)
+    if arguments.output and not faults:
+        faults += _fault(film_output.make_folder, arguments.output)
+        faults += _fault(job_file.write, arguments.output, version)
+    lines = [
+        f"Edit: {arguments.edit}, version {version.key}",
+        "Frames: {} to {}, {}×{}".format(frames[0], frames[-1], *film_output.size(scene)),
+        f"Device: {device}",
+        *[f"Note: {note}" for note in notes],
+    ]
+    command_line.print_line(error_report.text(scene) if arguments.report else "\n".join(lines))
     for fault in faults:
         render_job.say(fault)
     if faults:
