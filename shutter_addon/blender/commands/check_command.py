@@ -63,14 +63,14 @@ def _checked(arguments: Namespace, scene: Scene, frames: range) -> tuple[str, li
         device = available.name(kind)
     except NoDeviceError as error:
         faults.append(str(error))
-    found = edit_check.effects(scene, frames)
-    faults += found.faults
+    found, notes, folders = edit_check.effects(scene, frames)
+    faults += found
     faults += external_files.faults(scene, frames, sources=False)  # the effects' own faults are already there
     faults += external_files.sound_faults(scene, frames)
     movie = arguments.movie and arguments.movie.parent
-    for folder in filter(None, dict.fromkeys((arguments.output, movie, *found.folders))):
+    for folder in filter(None, dict.fromkeys((arguments.output, movie, *folders))):
         faults += _fault(film_output.check_writable, folder)
-    return device, [note for note in (lesser, *found.notes) if note], faults
+    return device, [note for note in (lesser, *notes) if note], faults
 
 
 def _version_faults(scene: Scene) -> list[str]:
