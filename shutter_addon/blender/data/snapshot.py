@@ -104,7 +104,7 @@ def read(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames) -> m
     # With layers, motions count for every region, at all frames around.
     followed = {s.follow_region for s in effect.shutters if s.follow == "REGION"}
     narrow = Sampling.of(scene, effect, strip, frames)
-    wide = replace(narrow, frames=_around(effect, frames))
+    wide = replace(narrow, frames=_around(effect, frames, layers))
     names = [shutter.name for shutter in effect.shutters]
     regions = tuple(
         _any_region(wide if layers or region.name in followed else narrow, i, names.index(region.shutter))
@@ -125,9 +125,8 @@ def read(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames) -> m
     )
 
 
-def _around(effect: PropertyGroup, frames: Frames) -> Frames:
+def _around(effect: PropertyGroup, frames: Frames, has_layers: bool) -> Frames:
     """Return the frames at which motions are needed: with those around where a shutter follows or a layer fills in."""
-    has_layers = any(region.is_layer for region in effect.regions)
     if has_layers or any(shutter.follow != "NOTHING" for shutter in effect.shutters):
         smooth = max(validation.number(shutter, "follow_smooth") for shutter in effect.shutters)
         reach = following.reach(validation.number(effect, "window")) + smooth
