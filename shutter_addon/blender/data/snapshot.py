@@ -12,7 +12,6 @@ from typing import Any
 
 import bpy
 import numpy as np
-from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import FCurve, PropertyGroup, Scene, Strip
 
@@ -28,14 +27,6 @@ from . import matte_content, preferences, sampled, source_media, strips, validat
 from .annotations import LAYERS, image_to_picture, layer_of, layers_of, picture_size
 from .fcurves import curves_under, points_of, progress, stretched
 from .sampled import Frames, Sampling
-
-# Sentences of core/model/effect.py, for the list of texts to translate.
-_CORE = (
-    n_('shutter "{name}" at frame {frame}: {fault}'),
-    n_('region "{name}": a point of its strokes is too far from the picture'),
-    n_('region "{name}": more than {most} points together with the regions before it'),
-    n_('shutter "{name}": bars {first} to {last} of the older file are one filmed frame now, and expose other moments'),
-)
 
 
 @dataclass(frozen=True, eq=False)
