@@ -1,6 +1,7 @@
 """The command line: `python -m shutter_addon render …`, or `blender -c shutter render …` in an installed Blender.
 
-Each command is a module of commands/. Its `add` adds a parser, whose default `run` is the command's function.
+Each command is a module of commands/, with a sentence for `--help`, a function that adds its options, and one that runs
+it.
 """
 
 import argparse
@@ -12,7 +13,7 @@ from ..core.messages import UserError
 from ..devices.device import NoDeviceError
 from ..media.files import check_name
 from .output import film_output
-from .rendering import render_job
+from .rendering import render_job, render_settings
 
 BAD_INPUT = 2
 PLACES = ("output", "save", "json", "source", "edit")  # options to name where an OSError names no file
@@ -27,7 +28,9 @@ def main(argv: list[str]) -> int:
         for path in vars(arguments).values():
             if isinstance(path, Path):
                 check_name(path)
-        arguments.run(arguments)
+        chosen = [getattr(arguments, name, None) for name in ("device", "weights", "gpu_memory")]
+        with render_settings.using(*chosen):
+            arguments.run(arguments)
     except SystemExit as stop:  # argparse, after --help or a message on stderr
         return int(stop.code or 0)
     except KeyboardInterrupt:  # between the frames of a render; finished ones stay
@@ -56,6 +59,9 @@ def _refuse(reason: str, code: int = BAD_INPUT) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser("shutter", description="Every pixel its own exposure.")
     commands = parser.add_subparsers(dest="command", required=True)
-    for command in COMMANDS:
-        import_module(f".commands.{command}_command", __package__).add(commands)
+    for name in COMMANDS:
+        command = import_module(f".commands.{name}_command", __package__)
+        options = commands.add_parser(name, help=command.HELP)
+        command.add(options)
+        options.set_defaults(run=command.run)
     return parser

@@ -9,7 +9,7 @@ import pytest
 from _bl_i18n_utils import bl_extract_messages, settings
 
 from shutter_addon import blender
-from shutter_addon.core.model import shutters
+from shutter_addon.core.model import effect, scribbles, shutters
 from shutter_addon.core.model.choices import CONTEXT
 from shutter_addon.media import camera_tracking, matte_tracking, pursuit, readout, tracking
 
@@ -32,7 +32,9 @@ def of_presets() -> set:
 
 def of_core() -> set:
     """Sentences of core that data/snapshot.py passes on in the user's language."""
-    return {("*", _fault(bars)) for bars in ([0], [-1], [math.inf], [1e7], [1e-7])}
+    faults = {("*", _fault(bars)) for bars in ([0], [-1], [math.inf], [1e7], [1e-7])}
+    named = (words for module in (effect, scribbles) for words in vars(module).values() if isinstance(words, str))
+    return faults | {("*", words) for words in named if '"{name}"' in words}
 
 
 def of_media() -> set:

@@ -46,9 +46,9 @@ def test_what_cannot_be_read_is_shown_at_an_even_speed(bpy, edit, tmp_path, monk
         picture_of(strip.scene, frame, told.append)
     said = 'strip "images": its retiming keys cannot be read'
     assert sum(said in sentence for sentence in told) == 1
-    found = edit_check.effects(edit, range(1, 52))
-    assert not found.faults
-    assert any(said in note for note in found.notes)
+    faults, notes, _folders = edit_check.effects(edit, range(1, 52))
+    assert not faults
+    assert any(said in note for note in notes)
 
 
 def test_other_memory_than_the_strips(bpy, edit, tmp_path):

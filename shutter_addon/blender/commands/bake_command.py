@@ -1,9 +1,8 @@
 """The command `bake`: the film of one effect of a saved edit, which an ordinary strip shows."""
 
-import argparse
 import itertools
 import os
-from argparse import Namespace
+from argparse import SUPPRESS, ArgumentParser, Namespace
 from contextlib import suppress
 
 from bpy.types import PropertyGroup, Scene, Strip
@@ -14,9 +13,10 @@ from ..editing import whole_edits
 from ..output import baked_film, film_output
 from . import command_line
 
+HELP = "render one effect of a saved edit, for a strip to show"
 
-def add(commands: argparse._SubParsersAction) -> None:
-    parser = commands.add_parser("bake", help="render one effect of a saved edit, for a strip to show")
+
+def add(parser: ArgumentParser) -> None:
     option, to_path = parser.add_argument, command_line.to_path
     option("source", type=to_path, help="a saved edit (.blend)")
     option("--strip", required=True, metavar="NAME", help="its effect strip")
@@ -24,8 +24,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     option("--format", choices=tuple(baked_film.KINDS), default="movie", help="H.264, or float EXR (default: movie)")
     option("--output", type=to_path, metavar="DIR", help="folder of the film (default: beside the edit)")
     command_line.add_device(parser)
-    option("--attached", action="store_true", help=argparse.SUPPRESS)  # to the Blender whose copy of an edit it reads
-    parser.set_defaults(run=run)
+    option("--attached", action="store_true", help=SUPPRESS)  # to the Blender whose copy of an edit it reads
 
 
 def run(arguments: Namespace) -> None:
@@ -39,7 +38,7 @@ def run(arguments: Namespace) -> None:
     if arguments.attached:
         _check_parent(film)
     total, numbers = len(film.frames), itertools.count(1)
-    with command_line.using_device(arguments), film_output.progress(total, "frame") as moved:
+    with film_output.progress(total, "frame") as moved:
 
         def told() -> None:
             moved()

@@ -1,9 +1,8 @@
 """The command `check`: whether an edit can be rendered on this machine."""
 
-import argparse
 import re
 import sys
-from argparse import Namespace
+from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
 from pathlib import Path
 
@@ -19,9 +18,10 @@ from ..output import edit_check, error_report, film_join, film_output, shared_fr
 from ..rendering import render_job, render_settings
 from . import command_line
 
+HELP = "find out whether an edit can be rendered here"
 
-def add(commands: argparse._SubParsersAction) -> None:
-    parser = commands.add_parser("check", help="find out whether an edit can be rendered here")
+
+def add(parser: ArgumentParser) -> None:
     option, to_path = parser.add_argument, command_line.to_path
     option("edit", metavar="FILE.blend", type=to_path, help="a saved edit")
     option("--frames", metavar="A:B", help="timeline frames A to B (default: all of the edit)")
@@ -32,24 +32,22 @@ def add(commands: argparse._SubParsersAction) -> None:
     option("--movie", type=to_path, metavar="FILE", help=f"the movie that the frames will be joined to ({movies})")
     command_line.add_device(parser)
     option("--report", action="store_true", help="print a report for a bug report, without names")
-    parser.set_defaults(run=run)
 
 
 def run(arguments: Namespace) -> None:
     scene, frames = command_line.open_edit(arguments.edit, arguments.frames)
     version = versions.of_edit(scene)
-    with command_line.using_device(arguments):
-        device, notes, faults = _checked(arguments, scene, frames)
-        if arguments.output and not faults:
-            faults += _fault(film_output.make_folder, arguments.output)
-            faults += _fault(job_file.write, arguments.output, version)
-        lines = [
-            f"Edit: {arguments.edit}, version {version.key}",
-            "Frames: {} to {}, {}×{}".format(frames[0], frames[-1], *film_output.size(scene)),
-            f"Device: {device}",
-            *[f"Note: {note}" for note in notes],
-        ]
-        command_line.print_line(error_report.text(scene) if arguments.report else "\n".join(lines))
+    device, notes, faults = _checked(arguments, scene, frames)
+    if arguments.output and not faults:
+        faults += _fault(film_output.make_folder, arguments.output)
+        faults += _fault(job_file.write, arguments.output, version)
+    lines = [
+        f"Edit: {arguments.edit}, version {version.key}",
+        "Frames: {} to {}, {}×{}".format(frames[0], frames[-1], *film_output.size(scene)),
+        f"Device: {device}",
+        *[f"Note: {note}" for note in notes],
+    ]
+    command_line.print_line(error_report.text(scene) if arguments.report else "\n".join(lines))
     for fault in faults:
         render_job.say(fault)
     if faults:
@@ -65,14 +63,14 @@ def _checked(arguments: Namespace, scene: Scene, frames: range) -> tuple[str, li
         device = available.name(kind)
     except NoDeviceError as error:
         faults.append(str(error))
-    found = edit_check.effects(scene, frames)
-    faults += found.faults
+    found, notes, folders = edit_check.effects(scene, frames)
+    faults += found
     faults += external_files.faults(scene, frames, sources=False)  # the effects' own faults are already there
     faults += external_files.sound_faults(scene, frames)
     movie = arguments.movie and arguments.movie.parent
-    for folder in filter(None, dict.fromkeys((arguments.output, movie, *found.folders))):
+    for folder in filter(None, dict.fromkeys((arguments.output, movie, *folders))):
         faults += _fault(film_output.check_writable, folder)
-    return device, [note for note in (lesser, *found.notes) if note], faults
+    return device, [note for note in (lesser, *notes) if note], faults
 
 
 def _version_faults(scene: Scene) -> list[str]:

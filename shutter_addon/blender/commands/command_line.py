@@ -4,8 +4,6 @@ import argparse
 import os
 import re
 import sys
-from argparse import Namespace
-from contextlib import AbstractContextManager
 from pathlib import Path
 
 from bpy.types import Scene
@@ -19,7 +17,7 @@ from ...media.sequence import by_number
 from ..devices import available
 from ..editing import whole_edits
 from ..output import film_output
-from ..rendering import render_job, render_settings
+from ..rendering import render_job
 
 
 def to_path(text: str) -> Path:
@@ -51,11 +49,6 @@ def add_device(parser: argparse.ArgumentParser) -> None:
         help="GPU memory for textures (default: as in Blender's preferences, else three quarters, and at most half of"
         " the machine's memory)",
     )
-
-
-def using_device(arguments: Namespace) -> AbstractContextManager[None]:
-    """In this context, render with the device that the options choose."""
-    return render_settings.using(arguments.device, gpu_memory=arguments.gpu_memory)
 
 
 def recipe(path: Path) -> Effect:

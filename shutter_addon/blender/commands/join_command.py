@@ -1,22 +1,21 @@
 """The command `join`: a movie of rendered frames, with the edit's sound."""
 
-import argparse
-from argparse import Namespace
+from argparse import ArgumentParser, Namespace
 
 from ...core.farm import job_file
 from ..data import external_files, versions
 from ..output import film_join, film_output
 from . import command_line
 
+HELP = "make a movie of rendered frames, with the edit's sound and settings"
 
-def add(commands: argparse._SubParsersAction) -> None:
-    parser = commands.add_parser("join", help="make a movie of rendered frames, with the edit's sound and settings")
+
+def add(parser: ArgumentParser) -> None:
     option, to_path = parser.add_argument, command_line.to_path
     option("folder", metavar="FRAMES", type=to_path, help="the folder of the frames")
     option("--edit", type=to_path, required=True, metavar="FILE.blend", help="the edit that they were rendered from")
     option("--output", type=to_path, required=True, help=f"a movie ({', '.join(film_output.MOVIES)})")
     option("--frames", metavar="A:B", help="timeline frames A to B (default: all of the edit)")
-    parser.set_defaults(run=run)
 
 
 def run(arguments: Namespace) -> None:

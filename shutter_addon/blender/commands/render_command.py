@@ -1,7 +1,6 @@
 """The command `render`: a film of a source and a recipe, or of a saved edit, through Blender's sequencer."""
 
-import argparse
-from argparse import Namespace
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 import bpy
@@ -13,16 +12,17 @@ from ...core.model.effect import Effect
 from ...core.recipes import recipe
 from ...media.opening import MatteFile
 from ...media.rendered_pictures import is_whole_blend, why_short
-from ..data import external_files, preferences, versions
+from ..data import external_files, versions
 from ..devices import available
 from ..editing import whole_edits
 from ..output import film_output, shared_frames
 from ..rendering import render_settings
 from . import command_line
 
+HELP = "render a source through a recipe, or a saved edit"
 
-def add(commands: argparse._SubParsersAction) -> None:
-    parser = commands.add_parser("render", help="render a source through a recipe, or a saved edit")
+
+def add(parser: ArgumentParser) -> None:
     option, to_path = parser.add_argument, command_line.to_path
     option("source", type=to_path, help="a movie, the first file of an image sequence, or a saved edit (.blend)")
     option("--recipe", type=to_path, help="the effect, a JSON file; not for a saved edit")
@@ -33,7 +33,6 @@ def add(commands: argparse._SubParsersAction) -> None:
     command_line.add_device(parser)
     option("--weights", type=to_path, metavar="DIR", help="also write the mattes of the shutters, as float EXR")
     option("--save", type=to_path, metavar="FILE.blend", help="keep the edit")
-    parser.set_defaults(run=run)
 
 
 def run(arguments: Namespace) -> None:
@@ -56,12 +55,11 @@ def _render_edit(arguments: Namespace) -> None:
     scene.frame_start, scene.frame_end = frames[0], frames[-1]
     for fault in external_files.faults(scene, frames, sources=True):
         raise film_output.OutputError(fault)  # Blender would render without it
-    with command_line.using_device(arguments):
-        version = versions.of_edit(scene)
-        job_file.guard(output, version)
-        shared_frames.check(output, arguments.format, frames, [arguments.source, *versions.read_files(scene)])
-        _check_device(arguments)
-        shared_frames.render(scene, output, file_format, version, resume=arguments.resume)
+    version = versions.of_edit(scene)
+    job_file.guard(output, version)
+    shared_frames.check(output, arguments.format, frames, [arguments.source, *versions.read_files(scene)])
+    available.choose(render_settings.wanted())  # before anything is written
+    shared_frames.render(scene, output, file_format, version, resume=arguments.resume)
 
 
 def _render_source(arguments: Namespace) -> None:
@@ -84,20 +82,14 @@ def _render_source(arguments: Namespace) -> None:
         scene = whole_edits.make_edit(path, medium, source_recipe, arguments.recipe.parent)
     scene.frame_start, scene.frame_end = frames[0], frames[-1]
     if output:
-        _check_device(arguments)
+        available.choose(render_settings.wanted())  # before anything is written
         film_output.set_output(scene, output, file_format, alpha=medium.alpha != "opaque")
     if arguments.save:
         _save(scene, arguments.save)
     if output and arguments.weights:
         film_output.make_folder(arguments.weights)
     if output:
-        with render_settings.using(arguments.device, arguments.weights, arguments.gpu_memory):
-            film_output.render_made_edit(scene, output)
-
-
-def _check_device(arguments: Namespace) -> None:
-    """Raise NoDeviceError if the wanted device is missing, before anything is written."""
-    available.choose(arguments.device or preferences.device())
+        film_output.render_made_edit(scene, output)
 
 
 def _written(arguments: Namespace, file_format: str, frames: range) -> list[Path]:

@@ -1,9 +1,8 @@
 """The command `track`: keys for a region of a recipe, which follows what it covers, or for the camera."""
 
-import argparse
 import json
-from argparse import Namespace
-from contextlib import ExitStack, closing
+from argparse import ArgumentParser, Namespace
+from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any
 
@@ -15,20 +14,21 @@ from ...core.model.effect import Camera, Effect, OutlineRegion, Region, SubjectR
 from ...core.model.scribbles import Drawings
 from ...core.recipes import recipe, recipe_file, region_keys
 from ...media import PrefetchSource, camera_tracking, matte_tracking, registration, tracking
-from ...media.carried_mattes import CarriedMattes
 from ...media.cuts import ShotSource
 from ...media.footage import Footage
 from ...media.smooth import SmoothSource, steps_for
-from ...media.subject_mattes import Subject, SubjectMattes
+from ...media.subject_mattes import CarriedFile, Subject
 from ..data import preferences
+from ..data.source_media import SourceSpec
 from ..editing import whole_edits
 from ..output import film_output
 from ..rendering import render_job
 from . import command_line
 
+HELP = "follow what a region covers, or the camera"
 
-def add(commands: argparse._SubParsersAction) -> None:
-    parser = commands.add_parser("track", help="follow what a region covers, or the camera")
+
+def add(parser: ArgumentParser) -> None:
     option, to_path = parser.add_argument, command_line.to_path
     option("source", type=to_path, help="a movie, or the first file of an image sequence")
     option("--recipe", type=to_path, required=True, help="the effect, a JSON file")
@@ -41,7 +41,6 @@ def add(commands: argparse._SubParsersAction) -> None:
     option("--hold", action="store_true", help="stay opaque where the track has ended: no keys of opacity")
     option("--output", type=to_path, required=True, metavar="R2.json", help="the recipe with the keys")
     option("--report", type=to_path, metavar="FILE.json", help="each frame's confidence, and where tracking ended")
-    parser.set_defaults(run=run)
 
 
 def run(arguments: Namespace) -> None:
@@ -138,16 +137,12 @@ def _cover(
         pairs = zip(drawn.frames, drawn.strokes, strict=True)
         return {filmed(frame): outlines.curves(strokes) for frame, strokes in pairs}
 
-    medium = ends.enter_context(command_line.open_footage(arguments.source))
-    mattes: CarriedMattes
+    drawings, subject = region.drawings, None
     if isinstance(region, SubjectRegion):
-        subject = Subject(strokes=curves(region.drawings), nots=curves(region.nots))
-        drawn = tuple(sorted(curves(region.outlines).items()))
-        mattes = SubjectMattes(medium, drawn, None, subject, preferences.model())
-    else:
-        mattes = CarriedMattes(medium, tuple(sorted(curves(region.drawings).items())))
-    ends.enter_context(closing(mattes))
-    return matte_tracking.cover_of(mattes, filmed)
+        drawings, subject = region.outlines, Subject(strokes=curves(region.drawings), nots=curves(region.nots))
+    footage = SourceSpec(key=(), path=arguments.source, files=None, options={})
+    file = CarriedFile(footage, tuple(sorted(curves(drawings).items())), None, subject, preferences.model())
+    return matte_tracking.cover_of(ends.enter_context(file.open()), filmed)
 
 
 def _ended(moving: Any, reach: int, tracked: dict, stops: list, start: int, frames: range) -> Any:

@@ -18,20 +18,11 @@ from ...core.model import effect as model
 from ...core.model.fields import fields_of
 from ...core.model.frame_state import Options
 from ...media import MediaError
-from . import (
-    external_files,
-    fcurves,
-    mask_reading,
-    matte_content,
-    preferences,
-    property_copy,
-    snapshot,
-    source_media,
-    strips,
-    versions,
-)
+from . import fcurves, mask_reading, matte_content, preferences, snapshot, source_media, strips, versions
 from .annotations import LAYERS, TRANSFORM, layer_of, picture_size
+from .external_files import every
 from .fcurves import numbers
+from .property_copy import plain
 
 # Identifies the files of a strip, or of a region whose matte is an image.
 Files = Callable[[Strip | PropertyGroup], Hashable]
@@ -169,7 +160,7 @@ def _curves(owner: Scene, path: str, start: int | None) -> Iterator[Hashable]:
             yield numbers(points, "easing", np.int32).tobytes()
             yield tuple(numbers(points, name).tobytes() for name in ("back", "amplitude", "period"))
         for modifier in curve.modifiers:
-            yield repr(property_copy.plain(modifier))
+            yield repr(plain(modifier))
 
 
 def _strokes(effect: PropertyGroup, region: PropertyGroup, start: int | None) -> Iterator[Hashable]:
@@ -225,6 +216,6 @@ def _contents(owner: Strip | PropertyGroup) -> Hashable:
         found = list(spec.files or [spec.path])
     else:
         matte_content.image_path(owner)
-        read, found = matte_content.channel(owner), external_files.every(owner.image)
+        read, found = matte_content.channel(owner), every(owner.image)
     digests = zip(found, versions.digests(found), strict=True)
     return read, tuple(digest or f"missing: {path.name}" for path, digest in digests)

@@ -1,6 +1,7 @@
 """Files that data-blocks name: images, volumes, sounds, libraries; and faults of those that an edit needs."""
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import bpy
@@ -25,22 +26,17 @@ def named(item: ID) -> list[Path]:
 
 def every(item: ID) -> list[Path]:
     """Return the files as `named` does, but all of a sequence, in order."""
-    return [file for path in named(item) for file in _sequence(item, path)]
+    files = named(item)
+    if getattr(item, "is_sequence", False) or getattr(item, "source", "") == "SEQUENCE":
+        with suppress(MediaError):
+            return [file for path in files for file in numbered_alike(path) or [path]]  # before the named one, too
+    return files
 
 
 def absolute(owner: ID | Strip, path: str) -> Path:
     """Return the absolute path of a file that a data-block or a strip names."""
     library = owner.library if isinstance(owner, bpy.types.ID) else owner.id_data.library
     return Path(bpy.path.abspath(path, library=library))
-
-
-def _sequence(item: ID, path: Path) -> list[Path]:
-    if not (getattr(item, "is_sequence", False) or getattr(item, "source", "") == "SEQUENCE"):
-        return [path]
-    try:
-        return numbered_alike(path) or [path]  # Blender may show files before the named one, too
-    except MediaError:
-        return [path]
 
 
 def faults(scene: Scene, frames: range, *, sources: bool) -> list[str]:

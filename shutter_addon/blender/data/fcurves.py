@@ -4,7 +4,7 @@ The engine gets the effect scene's depsgraph, which does not contain other scene
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 
 import bpy
@@ -193,38 +193,23 @@ def copy_curves(scene, path: str, new_scene, new_path: str) -> None:
 
 def remove_item(owner: PropertyGroup, collection: str, index: int) -> None:
     """Remove an item of a collection in a scene's property group, with its F-curves."""
-    items = getattr(owner, collection)
-    places = {index: None} | {i: i - 1 for i in range(index + 1, len(items))}
-    items.remove(index)
-    _reindex(owner, collection, places)
+    last = len(getattr(owner, collection)) - 1
+    move_item(owner, collection, index, last)
+    remove_curves(owner.id_data, f"{owner.path_from_id()}.{collection}[{last}]")
+    getattr(owner, collection).remove(last)
 
 
 def move_item(owner: PropertyGroup, collection: str, index: int, to: int) -> None:
     """Move an item of a collection in a scene's property group, with its F-curves."""
-    items = getattr(owner, collection)
+    items, path = getattr(owner, collection), f"{owner.path_from_id()}.{collection}"
     order = list(range(len(items)))
     order.insert(to, order.pop(index))
     items.move(index, to)
-    _reindex(owner, collection, {old: new for new, old in enumerate(order)})
-
-
-def _reindex(owner: PropertyGroup, collection: str, places: Mapping[int, int | None]) -> None:
-    """Change indices in F-curves' paths after items of a collection have moved.
-
-    Args:
-        places: New index by old index; None: removed.
-    """
-    scene, path = owner.id_data, f"{owner.path_from_id()}.{collection}"
     item = re.compile(re.escape(path) + r"\[(\d+)\]")
-    for curve in curves_under(scene, f"{path}["):
-        if (match := item.match(curve.data_path)) is None:  # made by a script, with the item's name
-            continue
-        index = int(match[1])
-        place = places.get(index, index)
-        if place is None:
-            _channelbag(scene).fcurves.remove(curve)
-        elif place != index:
-            curve.data_path = f"{path}[{place}]{curve.data_path[match.end() :]}"
+    for curve in curves_under(owner.id_data, f"{path}["):
+        match = item.match(curve.data_path)
+        if match and int(match[1]) in order:  # else a script made it
+            curve.data_path = f"{path}[{order.index(int(match[1]))}]{curve.data_path[match.end() :]}"
 
 
 def drives(curve) -> bool:

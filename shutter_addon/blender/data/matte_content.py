@@ -4,7 +4,6 @@ Regions know a matte strip by an identity, so that it may be renamed and cut.
 """
 
 import uuid
-from contextlib import closing
 from fractions import Fraction
 from functools import lru_cache
 from pathlib import Path
@@ -123,7 +122,7 @@ def _movie(spec: source_media.SourceSpec) -> tuple[int, Fraction | None]:
     Raises:
         MediaError: It cannot be read.
     """
-    with closing(spec.open()) as movie:
+    with spec.open() as movie:
         return movie.count, movie.fps
 
 

@@ -148,19 +148,18 @@ class _Tracked:
     )
 
 
-def location_property(description: str, **more: Any) -> object:
-    return FloatVectorProperty(
-        name="Location", description=description, subtype="XYZ", size=2, min=-MAX_DISTANCE, max=MAX_DISTANCE, **more
-    )
+def location_property(description: str) -> object:
+    limits = {"min": -MAX_DISTANCE, "max": MAX_DISTANCE}
+    return labelled(FloatVectorProperty, "Location", description, subtype="XYZ", size=2, **limits)
 
 
-def rotation_property(description: str, **more: Any) -> object:
+def rotation_property(description: str) -> object:
     limit = math.radians(MAX_DEGREES)
-    return FloatProperty(name="Rotation", description=description, subtype="ANGLE", min=-limit, max=limit, **more)
+    return labelled(FloatProperty, "Rotation", description, subtype="ANGLE", min=-limit, max=limit)
 
 
-def scale_property(description: str, **more: Any) -> object:
-    return FloatProperty(name="Scale", description=description, default=1.0, min=-MAX_SCALE, max=MAX_SCALE, **more)
+def scale_property(description: str) -> object:
+    return labelled(FloatProperty, "Scale", description, default=1.0, min=-MAX_SCALE, max=MAX_SCALE)
 
 
 @with_fields(
@@ -188,11 +187,9 @@ class ShutterRegion(_Tracked, PropertyGroup):
     )
     mask: labelled(PointerProperty, "Mask", "Mask that is the matte", type=bpy.types.Mask)
     channel_name: labelled(StringProperty, "Channel Name", "Name of the channel in the EXR file", maxlen=MAX_CHANNEL)
-    location: location_property(
-        "Distance from where the region was drawn, as a fraction of the picture", update=changed
-    )
-    rotation: rotation_property("Rotation about the region's center", update=changed)
-    scale: scale_property("Scale about the region's center", update=changed)
+    location: location_property("Distance from where the region was drawn, as a fraction of the picture")
+    rotation: rotation_property("Rotation about the region's center")
+    scale: scale_property("Scale about the region's center")
     follow_clip: PointerProperty(
         name="Clip",
         description="Movie clip of the source's footage, in which something is tracked",
@@ -208,9 +205,9 @@ class ShutterRegion(_Tracked, PropertyGroup):
 @with_fields(model.Camera)
 class ShutterCamera(_Tracked, PropertyGroup):
     name: StringProperty(name="Name", description="Name of the camera's animation channels", default="Camera")
-    location: location_property("Movement of what the camera sees, as a fraction of the picture", update=changed)
-    rotation: rotation_property("Rotation of what the camera sees, about the picture's center", update=changed)
-    scale: scale_property("Scale of what the camera sees, about the picture's center", update=changed)
+    location: location_property("Movement of what the camera sees, as a fraction of the picture")
+    rotation: rotation_property("Rotation of what the camera sees, about the picture's center")
+    scale: scale_property("Scale of what the camera sees, about the picture's center")
 
 
 def _shutter_renamed(shutter: PropertyGroup, new: str, old: str, _is_set: bool) -> str:

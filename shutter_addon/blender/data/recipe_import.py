@@ -14,11 +14,14 @@ from ...core.model import keyframes
 from ...core.model.choices import CHANNELS
 from ...core.model.fields import fields_of
 from ...core.model.scribbles import mapped
+from ...core.recipes import recipe
 from ...media.files import check_name
 from ...media.opening import MatteFile
 from ...media.sequence import IMAGE_SUFFIXES
 from . import fcurves, strips
 from .annotations import LAYERS, NOT_THIS, add_stroke, annotation, picture_size, picture_to_image
+
+_KINDS = {model.MatteRegion: "MATTE", model.OutlineRegion: "OUTLINE", model.SubjectRegion: "SUBJECT"}
 
 
 def apply(scene, effect, strip, source: model.Effect, folder: Path = Path()) -> None:
@@ -31,9 +34,7 @@ def apply(scene, effect, strip, source: model.Effect, folder: Path = Path()) -> 
         MediaError: A matte is missing. Nothing has changed.
     """
     first = strip.left_handle - 1
-    contents = [region.content for region in source.regions if isinstance(region, model.MatteRegion)]
-    files = [content for content in contents if isinstance(content, model.FileContent)]
-    images = {content: matte_image(folder / content.path, content.channel) for content in files}
+    images = {file: matte_image(folder / file.path, file.channel) for file in recipe.contents(source)}
     clear(scene, effect)
     path, options = effect.path_from_id(), source.options.at(1)
     _set_fields(scene, effect, path, options, first)
@@ -137,16 +138,11 @@ def _add_region(
 ) -> None:
     region = effect.regions.add()
     region.shutter = shutter.name
-    if isinstance(source, model.Region):
-        region.kind = source.kind.upper()
-    elif isinstance(source, model.OutlineRegion):
-        region.kind = "OUTLINE"
-    elif isinstance(source, model.SubjectRegion):
-        region.kind = "SUBJECT"
-    else:
-        region.kind = "RAMP" if isinstance(source.content, model.RampContent) else "MATTE"
-        if region.kind == "RAMP":
-            _set_fields(scene, region, path, source.content, first)
+    region.kind = source.kind.upper() if isinstance(source, model.Region) else _KINDS[type(source)]
+    content = getattr(source, "content", None)
+    if isinstance(content, model.RampContent):
+        region.kind = "RAMP"
+        _set_fields(scene, region, path, content, first)
     _set_fields(scene, region, path, source, first)
     if isinstance(source, model.SubjectRegion):
         for layer, drawings in zip(LAYERS, (source.drawings, source.nots, source.outlines), strict=True):

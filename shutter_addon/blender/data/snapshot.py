@@ -12,7 +12,6 @@ from typing import Any
 
 import bpy
 import numpy as np
-from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import FCurve, PropertyGroup, Scene, Strip
 
@@ -28,14 +27,6 @@ from . import matte_content, preferences, sampled, source_media, strips, validat
 from .annotations import LAYERS, image_to_picture, layer_of, layers_of, picture_size
 from .fcurves import curves_under, points_of, progress, stretched
 from .sampled import Frames, Sampling
-
-# Sentences of core/model/effect.py, for the list of texts to translate.
-_CORE = (
-    n_('shutter "{name}" at frame {frame}: {fault}'),
-    n_('region "{name}": a point of its strokes is too far from the picture'),
-    n_('region "{name}": more than {most} points together with the regions before it'),
-    n_('shutter "{name}": bars {first} to {last} of the older file are one filmed frame now, and expose other moments'),
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +95,7 @@ def read(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames) -> m
     # With layers, motions count for every region, at all frames around.
     followed = {s.follow_region for s in effect.shutters if s.follow == "REGION"}
     narrow = Sampling.of(scene, effect, strip, frames)
-    wide = replace(narrow, frames=_around(effect, frames))
+    wide = replace(narrow, frames=_around(effect, frames, layers))
     names = [shutter.name for shutter in effect.shutters]
     regions = tuple(
         _any_region(wide if layers or region.name in followed else narrow, i, names.index(region.shutter))
@@ -125,9 +116,8 @@ def read(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames) -> m
     )
 
 
-def _around(effect: PropertyGroup, frames: Frames) -> Frames:
+def _around(effect: PropertyGroup, frames: Frames, has_layers: bool) -> Frames:
     """Return the frames at which motions are needed: with those around where a shutter follows or a layer fills in."""
-    has_layers = any(region.is_layer for region in effect.regions)
     if has_layers or any(shutter.follow != "NOTHING" for shutter in effect.shutters):
         smooth = max(validation.number(shutter, "follow_smooth") for shutter in effect.shutters)
         reach = following.reach(validation.number(effect, "window")) + smooth

@@ -28,12 +28,10 @@ _PLACES = {
 def place(group: PropertyGroup) -> str:
     """Return the user's words for an effect, shutter, bar, region or camera."""
     path = group.path_from_id()
-    if path.endswith(".camera"):
-        words = _PLACES["camera"]
-        return rpt_(words).format(name=group.id_data.path_resolve(path.removesuffix(".camera")).name)
     match = re.match(r".*?effects\[\d+\](?:\.(shutters|regions)\[\d+\])?", path)
     assert match  # the group is an effect, or lies in one
-    words = rpt_(_PLACES[match[1] or ""]).format(name=group.id_data.path_resolve(match[0]).name)
+    kind = "camera" if path.endswith(".camera") else match[1] or ""
+    words = rpt_(_PLACES[kind]).format(name=group.id_data.path_resolve(match[0]).name)
     bar = re.search(r"\.bars\[(\d+)\]$", path)
     return rpt_("{shutter}, bar {number}").format(shutter=words, number=int(bar[1]) + 1) if bar else words
 

@@ -263,10 +263,9 @@ def start(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film) -> Bake
     copy = edit.with_name(f"{edit.stem}.bake-{secrets.token_hex(4)}.blend")  # relative paths stay valid there
     try:
         bpy.ops.wm.save_as_mainfile(filepath=str(copy), copy=True, relative_remap=False)
-        options = _options(scene, strip, film)
         with open(log / "out", "wb") as out, open(log / "err", "wb") as err:
             process = subprocess.Popen(
-                [*_command(), "bake", str(copy), *options],
+                _command(scene, strip, film, copy),
                 cwd=_ROOT,
                 stdin=subprocess.PIPE,  # closes with this process, which ends the other one
                 stdout=out,
@@ -279,17 +278,14 @@ def start(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film) -> Bake
     return BakeJob(scene.session_uid, effect.identity, strip.name, film, copy, log, process)
 
 
-def _options(scene: Scene, strip: Strip, film: Film) -> list[str]:
-    """Return the command's options. Names can begin with a dash."""
+def _command(scene: Scene, strip: Strip, film: Film, copy: Path) -> list[str]:
+    """Return the words that bake a film of a copied edit in another process. Names can begin with a dash."""
+    program = [sys.executable, "-m", "shutter_addon"]  # with Blender as a library
+    if bpy.app.binary_path:
+        package = __package__.rpartition(".shutter_addon")[0]
+        enabled = ["--addons", package] if package else []  # as here, regardless of saved preferences
+        program = [bpy.app.binary_path, "--background", *enabled, "--command", "shutter"]
     kind = next(name for name, kind in KINDS.items() if kind == film.kind)
     names = [f"--scene={scene.name}", f"--strip={strip.name}", f"--format={kind}", f"--output={film.place.parent}"]
-    return [*names, f"--device={preferences.device()}", f"--gpu-memory={preferences.gpu_memory()}", "--attached"]
-
-
-def _command() -> list[str]:
-    """Return the words that run the command `shutter` in another process."""
-    if not bpy.app.binary_path:  # Blender as a library
-        return [sys.executable, "-m", "shutter_addon"]
-    package = __package__.rpartition(".shutter_addon")[0]
-    enabled = ["--addons", package] if package else []  # as here, regardless of saved preferences
-    return [bpy.app.binary_path, "--background", *enabled, "--command", "shutter"]
+    device = [f"--device={preferences.device()}", f"--gpu-memory={preferences.gpu_memory()}"]
+    return [*program, "bake", str(copy), *names, *device, "--attached"]

@@ -2,8 +2,6 @@
 
 import math
 from collections.abc import Iterator
-from contextlib import closing
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from bpy.types import PropertyGroup, Scene, Strip
@@ -20,41 +18,30 @@ from ..rendering.session import RenderContext, RenderSession
 from .film_output import OutputError
 
 
-@dataclass
-class Findings:
-    """What a check finds.
-
-    Attributes:
-        faults: Why the edit cannot be rendered.
-        notes: What can be rendered, but not as one may expect.
-        folders: Folders to which the render writes mattes.
-    """
-
-    faults: list[str] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-    folders: set[Path] = field(default_factory=set)
-
-
-def effects(scene: Scene, frames: range) -> Findings:
+def effects(scene: Scene, frames: range) -> tuple[list[str], list[str], set[Path]]:
     """Check the effects that the scene's frames show, including those of scenes in it, each up to its first fault.
 
     Files are opened, and the first and last frames that are needed are read.
+
+    Returns:
+        Faults, why the edit cannot be rendered; notes, what can be rendered, but not as one may expect; and the folders
+        to which the render writes mattes.
     """
+    faults, notes, folders = list[str](), list[str](), set[Path]()
     # No GPU is needed, which would have to wait for its first picture, since only states and windows are read.
-    session, found = RenderSession(lambda: ("cpu", None), lambda: None), Findings()
+    session = RenderSession(lambda: ("cpu", None), lambda: None)
     try:
         for owner, effect, strip, shown in _shown_effects(scene, frames):
             try:
                 _check_footage(owner, effect, strip)
-                notes = _notes(session, found.folders, snapshot.take(owner, effect, strip, shown))
-                found.notes += [f'"{strip.name}": {note}' for note in notes]
+                said = _notes(session, folders, snapshot.take(owner, effect, strip, shown))
+                notes += [f'"{strip.name}": {note}' for note in said]
             except (OutputError, *effect_source.FAULTS) as error:
-                found.faults.append(f'"{strip.name}": {error}')
+                faults.append(f'"{strip.name}": {error}')
     finally:
         session.forget()
     reasons = [why for at, why in requirements.left_out(scene) if frame_ranges.common(at, frames)]
-    found.faults += dict.fromkeys(reasons)
-    return found
+    return [*faults, *dict.fromkeys(reasons)], notes, folders
 
 
 def _shown_effects(film: Scene, frames: range) -> Iterator[tuple]:
@@ -100,7 +87,7 @@ def _check_footage(scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
     The effect's scene has the size of the footage then.
     """
     source = strips.source_of(scene, effect, strip)
-    with closing(source_media.open_media(source)) as medium:
+    with source_media.open_media(source) as medium:
         size = medium.width, medium.height
         saved = effect.scene.render.resolution_x, effect.scene.render.resolution_y
         if saved != size:
@@ -137,7 +124,7 @@ def _lacking_mattes(source: FrameSource, requests: list[Request], folders: set[P
             if isinstance(matte.content, FileFrame):
                 shown.setdefault(matte.content.file, set()).add((matte.content, request.index // source.step))
     for file, contents in shown.items():
-        with closing(file.open()) as medium:
+        with file.open() as medium:
             indices = {content.index(medium, index) for content, index in contents}
             indices = {min(max(index, 0), medium.count - 1) for index in indices}
             if not isinstance(medium, CarriedMattes):

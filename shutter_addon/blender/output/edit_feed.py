@@ -73,18 +73,13 @@ def before_frame(scene: Scene) -> None:
     if not film.has_begun:  # a single picture can be saved as floats later
         film.has_begun = True
         return
-    seen = _seen(film, scene)
+    if film.makes_levels is None or render_job.scripts_act():
+        film.makes_levels = seen_alone.makes_levels(scene)
+    seen = seen_alone.alone(scene, scene.frame_current, film.strip) if film.makes_levels else None
     is_fed = seen is not None and _feed(film, scene, *seen)
     shown = film.strip and scene.sequence_editor.strips_all.get(film.strip)
     if shown and shown.mute == is_fed:  # changes are slow
         shown.mute = not is_fed
-
-
-def _seen(film: _Film, scene: Scene) -> tuple[Strip, bool] | None:
-    """Return seen_alone.alone at the current frame, if Blender's levels of it are known."""
-    if film.makes_levels is None or render_job.scripts_act():
-        film.makes_levels = seen_alone.makes_levels(scene)
-    return seen_alone.alone(scene, scene.frame_current, film.strip) if film.makes_levels else None
 
 
 def _feed(film: _Film, scene: Scene, strip: Strip, is_blended: bool) -> bool:

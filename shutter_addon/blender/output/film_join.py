@@ -35,6 +35,7 @@ def join(scene: Scene, folder: Path, output: Path, frames: range, key: str) -> N
         OutputError, MediaError: Frames are missing, damaged, different or of another edit, or the movie cannot be
             written.
         InterruptedRenderError: Stopped by Ctrl-C or TERM.
+        OSError: A folder cannot be read or made.
     """
     scene.frame_start, scene.frame_end = frames[0], frames[-1]
     paths = _pictures(folder, frames[:: scene.frame_step])
@@ -51,13 +52,14 @@ def join(scene: Scene, folder: Path, output: Path, frames: range, key: str) -> N
 
 
 def _pictures(folder: Path, frames: range) -> list[Path]:
-    """Return the picture of each frame, a file whose name is its number. OutputError: some are missing, or twice."""
+    """Return the picture of each frame, a file whose name is its number.
+
+    Raises:
+        OutputError: Some are missing, or twice.
+        OSError: The folder cannot be read.
+    """
     pictures: dict[int, Path] = {}
-    try:
-        files = sorted(path for path in folder.iterdir() if path.suffix[1:] in film_output.FORMATS)
-    except OSError as error:
-        raise OutputError(film_output.in_words(error, folder)) from None
-    for path in files:
+    for path in sorted(path for path in folder.iterdir() if path.suffix[1:] in film_output.FORMATS):
         if re.fullmatch(r"\d{1,9}", path.stem):
             other = pictures.setdefault(int(path.stem), path)
             if other != path:

@@ -143,7 +143,8 @@ def set_output(scene: Scene, path: Path, file_format: str, *, alpha: bool) -> No
         settings.media_type = "VIDEO"
         settings.color_mode = "RGB"
         render.ffmpeg.format, render.ffmpeg.codec = container, codec
-        render.ffmpeg.audio_codec = audio if _has_sound(scene) else "NONE"
+        shown_strips = (strip for shown in strips.shown_scenes(scene) for strip in strips.all_strips(shown))
+        render.ffmpeg.audio_codec = audio if any(strip.type == "SOUND" for strip in shown_strips) else "NONE"
         render.ffmpeg.constant_rate_factor = "HIGH"
         return
     _set_format(settings, file_format)
@@ -155,12 +156,6 @@ def set_place(render: RenderSettings, path: Path) -> None:
     render.use_file_extension = not is_movie(path)
     _stamp_nothing(render)
     render.filepath = blender_path(str(path) if is_movie(path) else f"{path}{os.sep}")
-
-
-def _has_sound(scene: Scene) -> bool:
-    """Return whether a scene, or one that it shows, has sound strips."""
-    shown_strips = [strip for shown in strips.shown_scenes(scene) for strip in shown.sequence_editor.strips_all]
-    return any(strip.type == "SOUND" for strip in shown_strips)
 
 
 def set_pictures(scene: Scene, file_format: str, note: str) -> None:
