@@ -72,11 +72,7 @@ def _eases(moving: Subject) -> dict[float, Ease]:
 
 
 def _moves(
-    moving: Subject,
-    placements: Placements,
-    exact: Collection[int],
-    chosen: list[int],
-    eases: Mapping[float, Ease],
+    moving: Subject, placements: Placements, exact: Collection[int], chosen: list[int], eases: Mapping[float, Ease]
 ) -> Moves:
     """Return moves with keys for the chosen placements, in place of those from the first placement to the last.
 
