@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..model import keyframes, limits
+from ..model import keyframes, limits, motions
 from ..model.effect import (
     Camera,
     Drawings,
@@ -234,8 +234,9 @@ def _moves(moving: Subject, words: Mapping[float, Ease], shown: range) -> Moves:
     """Return location, rotation and scale with the recipe's keys; `words`: see `_keys`."""
     keys = []
     for frame, ease in _move_keys(moving, words, shown):
-        x, y, degrees, scale = _place(moving, frame)
-        placed = Placement((_short(x), _short(y)), _short_degrees(degrees), _short(scale))
+        there = moving.placement(frame)
+        x, y = map(_short, there.location)
+        placed = Placement((x, y), _short_degrees(there.rotation), _short(there.scale))
         keys.append((_frame(frame, shown), placed, ease))
     return Moves.keyed(keys)
 
@@ -251,17 +252,12 @@ def _move_keys(moving: Subject, words: Mapping[float, Ease], shown: range) -> _E
 
     @cache
     def place(frame: float) -> np.ndarray:
-        return _place(moving, frame)
+        return motions.as_array([moving.placement(frame)])[0]
 
     if not frames and tuple(place(shown.start)) != (0, 0, 0, 1):
         frames = {shown.start}
     fits = _straight(place, lambda largest: TOLERANCE * np.maximum(1, largest))
     return _keys(fits, eases.items(), sorted(frames), words, shown) if frames or sampled else []
-
-
-def _place(moving: Subject, frame: float) -> np.ndarray:
-    placed = moving.placement(frame)
-    return np.array([*placed.location, placed.rotation, placed.scale])
 
 
 def _drawings(drawings: Drawings, frame: float) -> dict[float, list[np.ndarray]]:
