@@ -114,13 +114,9 @@ class RenderContext:
                 return request
         with translated(rpt_):
             index, state, direction = state_at(snapshot.effect, clip_of(snapshot, source), frame)
+        state = state.in_blocks(max(state.options.aggregate // key.detail.divisor, 1))
         request = Request(
-            index=index,
-            state=state.in_blocks(max(state.options.aggregate // key.detail.divisor, 1)),
-            direction=direction,
-            source=key,
-            levels=self.levels,
-            display=self.display,
+            index=index, state=state, direction=direction, source=key, levels=self.levels, display=self.display
         )
         session.requests[key.place] = snapshot, frame, request
         return request
