@@ -74,12 +74,11 @@ def _check_exposure(shutter: Any, place: str) -> None:
         _require(shutter.follow, f"{place}.trail", "the shutter follows nothing that moves")
         _require(shutter.length == "bars", f"{place}.trail", "a shutter has one length")
     chooses = shutter.combine in EXTREMES
-    only = "only lightest and darkest have a threshold"
-    _require(chooses or shutter.threshold is None, f"{place}.threshold", only)
+    has_threshold = shutter.threshold is not None
+    _require(chooses or not has_threshold, f"{place}.threshold", "only lightest and darkest have a threshold")
     is_soft = isinstance(shutter.softness, list) or shutter.softness != 0
-    _require(shutter.threshold is not None or not is_soft, f"{place}.softness", "it has no threshold")
-    ways = chooses or not shutter.by_luminance
-    _require(ways, f"{place}.by_luminance", "only lightest and darkest use it")
+    _require(has_threshold or not is_soft, f"{place}.softness", "it has no threshold")
+    _require(chooses or not shutter.by_luminance, f"{place}.by_luminance", "only lightest and darkest use it")
 
 
 def _check_follow(follow: str | None, regions: list, place: str) -> None:
