@@ -226,7 +226,7 @@ def still_rendered():
     _number += 1
     edit().render.filepath = str(OUT / f"still{_number:03d}.png")
     bpy.ops.render.render(write_still=True, scene="Edit")
-    if (failure := sys.modules[f"{traces.NAME}.shutter_addon.blender.rendering.render_job"].failure()) is not None:
+    if (failure := sys.modules[f"{traces.NAME}.shutter_addon.blender.rendering.render_job"].job.failure) is not None:
         print(f"refused: {failure}", flush=True)
     saw(still=f"still{_number:03d}.png", shows=expected)
 
