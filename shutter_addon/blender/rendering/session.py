@@ -206,8 +206,8 @@ class RenderSession:
 
     def last_detail(self, scene: int) -> Detail:
         """Return the detail of an effect scene's last pictures."""
-        known = map(self._renderers.get, ((scene, False), (scene, True)))
-        return next((each[0].detail for each in known if each), FULL)
+        known = self._renderers.get((scene, False)) or self._renderers.get((scene, True))
+        return known[0].detail if known else FULL
 
     def renderer(self, key: SourceKey, say: Callable[[str], None] = print) -> Renderer:
         """Return the renderer of a key. An effect keeps at most two, for plain and smooth pictures.
@@ -297,9 +297,7 @@ class RenderSession:
 
     def settle(self) -> None:
         """Forget everything if another device would be chosen now."""
-        try:
+        with suppress(NoDeviceError):  # raised again when a picture is asked for
             if self._chosen is None or self._chosen[0] == self._choose()[0]:
                 return
-        except NoDeviceError:
-            pass  # raised again when a picture is asked for
         self.forget()
