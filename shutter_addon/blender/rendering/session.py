@@ -142,7 +142,7 @@ class RenderSession:
         self._choose, self._ask_others, self._late = choose, ask_others, late
         self._frees_others = False  # whether others free memory, in the middle of a picture
         self._chosen: tuple[str, str | None] | None = None
-        self._executor: Executor | None = None
+        self._executor: Executor = threads.pool(1)
         self._compositor: Future | None = None
         self._renderers: dict[Place, tuple[SourceKey, Renderer]] = {}
         self.requests: dict[Place, tuple[Snapshot, float, Request]] = {}  # the last ones, with their snapshots
@@ -170,8 +170,6 @@ class RenderSession:
         """Call a function that uses the device, after those submitted before."""
         ended = threading.Event()
         if self.threaded:
-            if self._executor is None:
-                self._executor = threads.pool(1)
             with suppress(RuntimeError):  # at Python's exit, threads take no more work
                 future = self._executor.submit(broken_off, ended.is_set, function, *arguments)
                 return Work(future, ended)
@@ -290,9 +288,8 @@ class RenderSession:
         if compositor is not None:
             with suppress(NoDeviceError):
                 self.run(lambda: compositor.result().release())  # after the rest of a stopped render
-        if self._executor is not None:
-            self._executor.shutdown(wait=False)
-            self._executor = None
+        ended, self._executor = self._executor, threads.pool(1)
+        ended.shutdown(wait=False)
         self._chosen = None
 
     def settle(self) -> None:
