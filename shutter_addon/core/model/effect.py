@@ -474,8 +474,7 @@ class Effect:
         camera = camera or self.camera
         new: dict[int, Subject] = {id(old): each for old, each in zip(self.regions, regions, strict=True)}
         new[id(self.camera)] = camera
-        followed = tuple(shutter.follow and new[id(shutter.follow)] for shutter in self.shutters)
-        shutters_ = tuple(replace(s, follow=follow) for s, follow in zip(self.shutters, followed, strict=True))
+        shutters_ = tuple(replace(each, follow=each.follow and new[id(each.follow)]) for each in self.shutters)
         return replace(self, shutters=shutters_, regions=tuple(regions), camera=camera)
 
     def for_picture(self, aspect: float, files: MatteFiles = lambda _region: mattes.NoFile()) -> Effect:

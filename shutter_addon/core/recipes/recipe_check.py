@@ -51,8 +51,7 @@ def check(recipe: Any) -> None:
         _check_exposure(shutter, place)
     points = 0
     for i, region in enumerate(recipe.regions):
-        there_is_none = f"there is no shutter {shown(region.shutter)}"
-        _require(region.shutter in places, f"regions[{i}].shutter", there_is_none)
+        _require(region.shutter in places, f"regions[{i}].shutter", f"there is no shutter {shown(region.shutter)}")
         points += _check_drawn(region, f"regions[{i}]")
     _require(points <= limits.MAX_POINTS, "regions", f"{points} points at once, the most are {limits.MAX_POINTS}")
 
