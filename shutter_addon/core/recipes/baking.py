@@ -126,7 +126,8 @@ def _said(part: Any, shown: range) -> dict[str, Any]:
     for name, each in fields_of(type(part)).items():
         value = getattr(part, name)
         if each.is_channel:
-            value = _number(value, shown) if each.keyed_in_recipe else Constant(_short(value.at(shown.start)))
+            is_keyed = each.keyed_in_recipe and isinstance(value, Samples)
+            value = _number_keys(value.at, value, shown) if is_keyed else Constant(_short(value.at(shown.start)))
         said[name] = value
     return said
 
@@ -160,12 +161,6 @@ def _keyed(eased: _Eased, value: Callable[[float], Any], shown: range) -> Keys:
     """Return keys at these frames; `value` gives the value at a timeline frame."""
     frames, eases = zip(*eased, strict=True)
     return Keys(tuple(_frame(frame, shown) for frame in frames), tuple(map(value, frames)), eases)
-
-
-def _number(channel: Channel, shown: range) -> Channel:
-    if isinstance(channel, Samples):
-        return _number_keys(channel.at, channel, shown)
-    return Constant(_short(channel.at(shown.start)))
 
 
 def _time(time: Channel, shown: range) -> SourceTime:
