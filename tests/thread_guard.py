@@ -25,7 +25,6 @@ REVIEWED: dict[str, set[str]] = {
     "devices/blender_gpu.py": {
         "BlenderDevice.__init__",
         "BlenderDevice._cleared",
-        "BlenderDevice._let_go",
         "BlenderDevice.freeing",
         "BlenderDevice.read",
         "BlenderDevice.run",

@@ -79,9 +79,9 @@ def _before_save(*_) -> None:
 
 def _update(scene: Scene | None = None, depsgraph: Depsgraph | None = None) -> None:
     revision.changed()
-    if (film := render_job.film()) is not None and bpy.app.is_job_running("RENDER"):
+    if (film := render_job.job.film) is not None and bpy.app.is_job_running("RENDER"):
         job_snapshots.look(film)
-    if not render_job.cancelling():
+    if not render_job.job.cancelling:
         reconciling.update(scene)
     # Blender redraws previews for most changes, but not for a mask. It may crash if one is drawn while a render ends.
     if depsgraph is not None and depsgraph.id_type_updated("MASK") and not render_job.runs():
@@ -99,7 +99,7 @@ def _after_undo(*_) -> None:
 
 
 def _before_render(scene: Scene, *_) -> None:
-    if render_job.cancelling():
+    if render_job.job.cancelling:
         return
     is_film = render_job.begin(scene)
     if scene.render.engine == strips.ENGINE and render_job.where() is not Where.JOB:

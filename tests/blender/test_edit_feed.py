@@ -258,7 +258,7 @@ def test_the_edit_is_put_back(bpy, edit, made, tmp_path, how):
             return
         seen.append(look(edit) != before)
         if how == "stopped":
-            render_job.stop()
+            render_job.job.stopping = True
         elif how == "saved":
             bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "edit.blend"), copy=True)
 

@@ -276,7 +276,7 @@ def test_a_scene_within_a_film_does_not_begin_it_again(bpy, film, monkeypatch):
     shown.collection.objects.link(shown.camera)
     film.sequence_editor.strips.new_scene("Shown", shown, 7, 1)
     told, begun, prepare = [], [], source_media.look_again  # once, as a film begins
-    monkeypatch.setattr(source_media, "look_again", lambda: begun.append(render_job.film()) or prepare())
+    monkeypatch.setattr(source_media, "look_again", lambda: begun.append(render_job.job.film) or prepare())
     bpy.app.handlers.render_init.append(lambda scene, *_: told.append(scene.name))
     try:
         bpy.ops.render.render(animation=True)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support import effect_of, recipe, write_frames
 
-from shutter_addon.blender.rendering import pictures
+from shutter_addon.blender.rendering import render_job
 
 LEVELS = 1
 # Where Blender changes colours of a strip that it lays over others.
@@ -51,7 +51,7 @@ def test_an_effect_that_is_added_keeps_all_colours(edit, render, made, capfd, mo
     for space in sorted(LOSSY | set(spaces[::9])):
         told = f'In the color space "{space}" Blender'
         edit.sequencer_colorspace_settings.name = space
-        monkeypatch.setattr(pictures, "_said", set())  # what was said is not said again
+        monkeypatch.setattr(render_job.job, "said", set())  # what was said is not said again
         strip = made()
         assert strip.blend_type == ("REPLACE" if space in LOSSY else "ALPHA_OVER"), space
         assert apart(edit, render, strip) <= LEVELS, space

@@ -9,7 +9,7 @@ from support import Like, image_strip, picture_of, started, write_frames
 
 from shutter_addon.blender.data import source_media, struct_dna
 from shutter_addon.blender.output import edit_check
-from shutter_addon.blender.rendering import pictures
+from shutter_addon.blender.rendering import render_job
 from shutter_addon.core.frames.retiming import RetimingKey, are_retiming_keys
 from shutter_addon.core.model.clip import Clip
 
@@ -37,7 +37,7 @@ def test_what_cannot_be_read_is_shown_at_an_even_speed(bpy, edit, tmp_path, monk
         raise struct_dna.LayoutError
 
     told: list[str] = []
-    monkeypatch.setattr(pictures, "_said", set())  # by which a sentence is told once: as a new Blender has it
+    monkeypatch.setattr(render_job.job, "said", set())  # by which a sentence is told once: as a new Blender has it
     monkeypatch.setattr(source_media, "record", unknown)
     timing = source_media.timing_of(source)
     assert timing.keys == (known.keys[0], known.keys[-1])

@@ -212,7 +212,7 @@ def still_rendered():
     _number += 1
     edit().render.filepath = str(OUT / f"still{_number:03d}.png")
     bpy.ops.render.render(write_still=True, scene="Edit")
-    if (failure := part("blender.rendering.render_job").failure()) is not None:
+    if (failure := part("blender.rendering.render_job").job.failure) is not None:
         print(f"refused: {failure}", flush=True)
     driver.saw(still=f"still{_number:03d}.png", shows=expected)
 

@@ -100,20 +100,17 @@ class BlenderDevice(Device):
         return nullcontext(self)
 
     def _cleared(self) -> AbstractContextManager[BlenderDevice]:
-        if gpu.platform.backend_type_get() == "OPENGL":
-            self._let_go()
-        return nullcontext(self)
-
-    def _let_go(self) -> None:
-        """Unbind our textures from the current OpenGL context.
+        """Unbind our textures from the current OpenGL context, if there is one.
 
         Blender has one context for an engine's render and one for drawing. A texture that is freed in one stays bound
         in the other. Blender and Mesa take a new texture with the same number for that one, so passes would use it.
         """
-        if self._spare is None:
-            self._spare = Texture(None, (1, 1, 1), "rgba32f", self._make(1, 1, 1, "rgba32f"))
-        spares = dict.fromkeys((*LETTING_GO.samplers, *LETTING_GO.images), self._spare)
-        self.run(LETTING_GO, (1, 1), textures=spares, images=spares, layer=0)
+        if gpu.platform.backend_type_get() == "OPENGL":
+            if self._spare is None:
+                self._spare = Texture(None, (1, 1, 1), "rgba32f", self._make(1, 1, 1, "rgba32f"))
+            spares = dict.fromkeys((*LETTING_GO.samplers, *LETTING_GO.images), self._spare)
+            self.run(LETTING_GO, (1, 1), textures=spares, images=spares, layer=0)
+        return nullcontext(self)
 
     def _make(self, width: int, height: int, layers: int, kind: str) -> gpu.types.GPUTexture:
         return _new((width, height), kind.upper(), layers=layers)

@@ -333,7 +333,7 @@ def stoppable() -> Iterator[list[int]]:
         if signals:
             render_job.leave(INTERRUPTED)
         signals.append(number)
-        render_job.stop()
+        render_job.job.stopping = True
 
     before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
     try:

@@ -84,14 +84,8 @@ class SourceKey:
         steps = find_steps(snapshot) if detail.smooth else 1
         if known_steps(snapshot) == 1:
             detail = replace(detail, smooth=True)
-        return SourceKey(
-            scene=snapshot.scene,
-            spec=snapshot.source,
-            steps=steps,
-            skip_repeats=steps > 1 and _options(snapshot).skip_repeats,
-            detail=detail,
-            folder=snapshot.folder,
-        )
+        skips = steps > 1 and _options(snapshot).skip_repeats
+        return SourceKey(snapshot.scene, snapshot.source, steps, skips, detail, snapshot.folder)
 
     @property
     def place(self) -> tuple[int, bool]:

@@ -22,7 +22,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
     bl_use_preview = False
 
     def render(self, depsgraph: Depsgraph) -> None:
-        if render_job.cancelling():
+        if render_job.job.cancelling:
             self.report({"ERROR"}, self.bl_label)  # any error ends the other render
             return
         try:

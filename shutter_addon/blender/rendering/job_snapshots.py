@@ -54,18 +54,15 @@ def begin(film: int) -> None:
     end()
     film_scene = strips.scene_of_uid(film)
     for scene, effect, parts in shown_effects(film_scene) if film_scene else ():
-        if effect.scene.session_uid in running.taken:  # a copied scene: the first counts, as in strips.find_effect
+        uid, is_film = effect.scene.session_uid, scene == film_scene
+        if uid in running.taken:  # a copied scene: the first counts, as in strips.find_effect
             continue
         try:
-            running.taken[effect.scene.session_uid] = [
-                (
-                    range(part.left_handle, part.right_handle),
-                    snapshot.take(scene, effect, part, asked_frames(scene, [part], scene == film_scene)),
-                )
-                for part in parts
-            ]
+            taken = [snapshot.take(scene, effect, part, asked_frames(scene, [part], is_film)) for part in parts]
+            shown = [range(part.left_handle, part.right_handle) for part in parts]
+            running.taken[uid] = list(zip(shown, taken, strict=True))
         except effect_source.FAULTS as error:
-            running.taken[effect.scene.session_uid] = error
+            running.taken[uid] = error
     look(film)
 
 
@@ -129,7 +126,7 @@ def _of_film(scene: Scene, effect: PropertyGroup, strip: Strip, frame: float) ->
         return known
     if is_again:
         parts = [part for part in strips.effect_strips(scene) if part.scene == effect.scene]
-        frames |= asked_frames(scene, parts, scene.session_uid == render_job.film())
+        frames |= asked_frames(scene, parts, scene.session_uid == render_job.job.film)
     taken = snapshot.take(scene, effect, strip, frames)
     if render_job.runs():
         running.read[key] = taken if is_again else None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from itertools import chain
 from pathlib import Path
 
@@ -20,13 +20,11 @@ from ...media import color
 from ...media.image_writing import write_exr
 from ..data import consistency
 from ..data.snapshot import Snapshot
-from . import render_settings
+from . import render_job, render_settings
 from .effect_source import FULL, Detail
 from .session import RenderContext
 
 SLOW_DECODING = n_("a second Blender decodes movies, which is slow: install the zip that is made for your system")
-
-_said: set[str] = set()  # sentences, each said once
 
 
 def picture(context: RenderContext, snapshot: Snapshot, frame: float, detail: Detail = FULL) -> np.ndarray:
@@ -45,10 +43,10 @@ def picture(context: RenderContext, snapshot: Snapshot, frame: float, detail: De
         place = weights / f"{round(frame - snapshot.first + 1):04d}.exr"
         _write_weights(place, snapshot, frame, session.run(_weights, renderer, request))
     if renderer.source.by_blender:
-        _say_once(rpt_(SLOW_DECODING), context.say)
+        render_job.say_once(rpt_(SLOW_DECODING), context.say)
     made = session.picture(request)
     for sentence in shortages(renderer, snapshot, request):
-        _say_once(sentence, context.say)
+        render_job.say_once(sentence, context.say)
     return made
 
 
@@ -71,12 +69,6 @@ def _write_weights(place: Path, snapshot: Snapshot, frame: float, weights: list[
         names.append(consistency.unique(region.name or "Region", names))
         channels.append(next(shown) if region in there else np.zeros_like(weights[0]))
     write_exr(place, np.stack(channels, axis=-1), names)
-
-
-def _say_once(sentence: str, say: Callable[[str], None]) -> None:
-    if sentence not in _said:
-        _said.add(sentence)
-        say(sentence)
 
 
 def shortages(renderer: Renderer, snapshot: Snapshot, request: Request) -> Iterator[str]:

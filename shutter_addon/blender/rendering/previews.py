@@ -151,9 +151,8 @@ def for_drawing(context: Context, shown: Shown, decision: Decision | None) -> Dr
     request = _drafted(context, shown, decision.request)
     has_result = settings.view in RESULTS
     left = settings.split if settings.view == "SPLIT" else 0.0 if has_result else 1.0
-    if (
-        _TRACKING & render_job.operators_running()
-    ):  # in the sharp source, the user sees whether a stroke stays on its subject
+    # In the sharp source, the user sees whether a stroke stays on its subject.
+    if _TRACKING & render_job.operators_running():
         left = 1.0
     # Otherwise Blender shows the engine's picture among the other strips.
     draws_result = has_result and left < 1 and (decision.is_drawn or not _is_rendered(shown))
@@ -178,8 +177,7 @@ def _decide(context: Context, shown: Shown, look: Look, snapshot: Snapshot) -> D
     render = sessions.of_drawing()
     request = _requested(context, render, shown, snapshot, look)
     is_plain = smooth_previews.comes(snapshot.scene)
-    is_less = is_plain or is_going(context)
-    is_drawn = _is_drawn(context, shown, look, render.renderer(request).source, is_less=is_less)
+    is_drawn = _is_drawn(context, shown, look, render.renderer(request).source, is_less=is_plain or is_going(context))
     return Decision(snapshot, shown.scene.frame_current, request, is_drawn, is_plain)
 
 
@@ -193,11 +191,8 @@ def _requested(context: Context, render: RenderContext, shown: Shown, snapshot: 
     Another frame or a change of the effect ends full quality.
     """
     frame = shown.scene.frame_current
-    if (
-        (whole := looking.whole) is not None
-        and (whole.scene, whole.frame) == (snapshot.scene, frame)
-        and not is_going(context)
-    ):
+    whole = looking.whole
+    if whole and (whole.scene, whole.frame) == (snapshot.scene, frame) and not is_going(context):
         plain = render.request(snapshot, frame, replace(effect_source.FULL, smooth=False))
         if whole.key in (None, plain.key[1:]):
             whole.key = plain.key[1:]

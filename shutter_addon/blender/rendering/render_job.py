@@ -62,12 +62,13 @@ class _Job:
     Attributes:
         film: session_uid of the rendered scene, not of effect scenes or scenes in strips; None: nothing renders.
         begun: Whether its first frame has begun.
-        stopping: Whether it ends after the current frame.
-        failure: The sentence that ends it.
+        stopping: Whether it ends after the current frame, as at Ctrl-C.
+        failure: The sentence that ends it, or ended the last one.
         tell: Called with that sentence in the background.
         cancelling: Whether the small render runs whose error ends it (_cancel).
         waited_for: Whether the window waits for every picture (Where.WAITED_FOR).
         spent: Names of scenes and cameras of small renders (_cancel).
+        said: Sentences that were said once (say_once).
     """
 
     film: int | None = None
@@ -78,40 +79,43 @@ class _Job:
     cancelling: bool = False
     waited_for: bool = False
     spent: list[tuple[str, str]] = field(default_factory=list)
+    said: set[str] = field(default_factory=set)
 
 
-_job = _Job()
+job = _Job()
+
+
+def say_once(text: str, to: Callable[[str], None]) -> None:
+    """Pass a sentence to a function, unless that was done before."""
+    if text not in job.said:
+        job.said.add(text)
+        to(text)
 
 
 def begin(scene: Scene) -> bool:
     """Note that a render begins. Return whether it is a film or a picture, not a scene in one or a preview."""
     is_effect = scene.render.engine == ENGINE
-    if _job.film is not None and (_job.begun or is_effect):
+    if job.film is not None and (job.begun or is_effect):
         return False
     # Render Sequencer Animation calls render_init only for each effect in the film.
     is_job = where() in (Where.JOB, Where.WAITED_FOR)
-    _job.waited_for = is_effect and is_job and "RENDER_OT_opengl" in operators_running()
+    job.waited_for = is_effect and is_job and "RENDER_OT_opengl" in operators_running()
     if is_effect and where() is Where.WINDOW:
         return False  # a preview
-    _job.film, _job.begun, _job.failure, _job.stopping = scene.session_uid, False, None, False
+    job.film, job.begun, job.failure, job.stopping = scene.session_uid, False, None, False
     return True
 
 
 def runs() -> bool:
     """Tell whether a film, or a single picture of it, is rendered."""
-    return _job.film is not None
-
-
-def film() -> int | None:
-    """Return the session_uid of the rendered scene."""
-    return _job.film
+    return job.film is not None
 
 
 def is_film(scene: Scene) -> bool:
     """Tell whether this scene is what is rendered; called before each of its frames."""
-    if scene.session_uid != _job.film:
+    if scene.session_uid != job.film:
         return False
-    _job.begun = True
+    job.begun = True
     return True
 
 
@@ -121,13 +125,13 @@ def end(scene: Scene, alone: bool) -> None:
     Args:
         alone: Whether no Python code waits for it, so that Blender would go on or exit with code 1.
     """
-    if scene.session_uid == _job.film:
-        _job.film = None
+    if scene.session_uid == job.film:
+        job.film = None
         if bpy.app.background:
             _remove_spent()
         else:  # Blender's data belongs to the main thread
             main_thread.soon(lambda: bpy.app.timers.register(_remove_spent))
-        if _job.failure is not None and alone and bpy.app.background:
+        if job.failure is not None and alone and bpy.app.background:
             leave(BAD_INPUT)
 
 
@@ -138,7 +142,7 @@ def ends_films() -> bool:
     """
     if where() is not Where.WINDOW:
         return True
-    return _job.film is not None and not bpy.app.is_job_running("RENDER")
+    return job.film is not None and not bpy.app.is_job_running("RENDER")
 
 
 def script_waits(call_frame: FrameType | None) -> bool:
@@ -156,7 +160,7 @@ def where() -> Where:
         return Where.BACKGROUND
     if threading.current_thread() is threading.main_thread():
         return Where.WINDOW
-    return Where.WAITED_FOR if _job.waited_for else Where.JOB
+    return Where.WAITED_FOR if job.waited_for else Where.JOB
 
 
 def operators_running() -> set[str]:
@@ -167,7 +171,7 @@ def operators_running() -> set[str]:
 
 def telling(to: Callable[[str], None]) -> AbstractContextManager[None]:
     """Inside a `with` block, pass the sentence that ends a render in the background to a function, not to stderr."""
-    return for_a_while([(_job, "tell", to)])
+    return for_a_while([(job, "tell", to)])
 
 
 @contextmanager
@@ -215,26 +219,16 @@ def soon(function: Callable[[], None]) -> None:
         function()
 
 
-def stop() -> None:
-    """End the render after the current frame, as at Ctrl-C."""
-    _job.stopping = True
-
-
 def stopping() -> bool:
     """Tell whether the film of this picture was stopped, or has failed."""
-    return _job.film is not None and ends_films() and (_job.stopping or _job.failure is not None)
+    return job.film is not None and ends_films() and (job.stopping or job.failure is not None)
 
 
 def fail(text: str) -> None:
     """Say why the running render has to end; only the first sentence counts."""
-    if _job.failure is None:
-        _job.failure = text
-        _job.tell(text)
-
-
-def failure() -> str | None:
-    """Return the sentence that ended the current or last render, or None."""
-    return _job.failure
+    if job.failure is None:
+        job.failure = text
+        job.tell(text)
 
 
 def cancel(ended: Callable[[], bool] | None = None) -> None:
@@ -257,8 +251,8 @@ def cancel(ended: Callable[[], bool] | None = None) -> None:
 def _cancel_and_show() -> None:
     """Cancel, and show the failure in the window, where reports of an engine in the sequencer do not arrive."""
     _cancel()
-    if _job.failure is not None:
-        text = sentence(_job.failure)
+    if job.failure is not None:
+        text = sentence(job.failure)
         with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
             bpy.context.window_manager.popup_menu(
                 lambda menu, _context: menu.layout.label(text=text), title="Virtual Shutter", icon="ERROR"
@@ -270,12 +264,12 @@ def _cancel() -> None:
 
     Errors from within the sequencer reach none, so a small render beside it fails.
     """
-    if _job.cancelling:
+    if job.cancelling:
         return
-    _job.cancelling = True
+    job.cancelling = True
     scene = bpy.data.scenes.new("Cancelled")
     camera = bpy.data.objects.new("Cancelled", None)
-    _job.spent.append((scene.name, camera.name))
+    job.spent.append((scene.name, camera.name))
     try:
         scene.render.engine = ENGINE
         scene.render.resolution_x = scene.render.resolution_y = 4
@@ -284,7 +278,7 @@ def _cancel() -> None:
         with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]), suppress(RuntimeError):
             bpy.ops.render.render(scene=scene.name)
     finally:
-        _job.cancelling = False
+        job.cancelling = False
 
 
 def _remove_spent() -> float | None:
@@ -294,16 +288,11 @@ def _remove_spent() -> float | None:
     """
     if bpy.app.is_job_running("RENDER"):
         return _PATIENCE
-    while _job.spent:
-        scene, camera = _job.spent.pop()
+    while job.spent:
+        scene, camera = job.spent.pop()
         items = (bpy.data.scenes.get(scene), bpy.data.objects.get(camera))
         bpy.data.batch_remove([item for item in items if item is not None])
     return None
-
-
-def cancelling() -> bool:
-    """Tell whether the small render runs whose error ends the other one."""
-    return _job.cancelling
 
 
 def leave(code: int) -> None:

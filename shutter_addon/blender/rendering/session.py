@@ -114,13 +114,9 @@ class RenderContext:
                 return request
         with translated(rpt_):
             index, state, direction = state_at(snapshot.effect, clip_of(snapshot, source), frame)
+        state = state.in_blocks(max(state.options.aggregate // key.detail.divisor, 1))
         request = Request(
-            index=index,
-            state=state.in_blocks(max(state.options.aggregate // key.detail.divisor, 1)),
-            direction=direction,
-            source=key,
-            levels=self.levels,
-            display=self.display,
+            index=index, state=state, direction=direction, source=key, levels=self.levels, display=self.display
         )
         session.requests[key.place] = snapshot, frame, request
         return request
@@ -146,7 +142,7 @@ class RenderSession:
         self._choose, self._ask_others, self._late = choose, ask_others, late
         self._frees_others = False  # whether others free memory, in the middle of a picture
         self._chosen: tuple[str, str | None] | None = None
-        self._executor: Executor | None = None
+        self._executor: Executor = threads.pool(1)
         self._compositor: Future | None = None
         self._renderers: dict[Place, tuple[SourceKey, Renderer]] = {}
         self.requests: dict[Place, tuple[Snapshot, float, Request]] = {}  # the last ones, with their snapshots
@@ -174,8 +170,6 @@ class RenderSession:
         """Call a function that uses the device, after those submitted before."""
         ended = threading.Event()
         if self.threaded:
-            if self._executor is None:
-                self._executor = threads.pool(1)
             with suppress(RuntimeError):  # at Python's exit, threads take no more work
                 future = self._executor.submit(broken_off, ended.is_set, function, *arguments)
                 return Work(future, ended)
@@ -210,8 +204,8 @@ class RenderSession:
 
     def last_detail(self, scene: int) -> Detail:
         """Return the detail of an effect scene's last pictures."""
-        known = map(self._renderers.get, ((scene, False), (scene, True)))
-        return next((each[0].detail for each in known if each), FULL)
+        known = self._renderers.get((scene, False)) or self._renderers.get((scene, True))
+        return known[0].detail if known else FULL
 
     def renderer(self, key: SourceKey, say: Callable[[str], None] = print) -> Renderer:
         """Return the renderer of a key. An effect keeps at most two, for plain and smooth pictures.
@@ -294,16 +288,13 @@ class RenderSession:
         if compositor is not None:
             with suppress(NoDeviceError):
                 self.run(lambda: compositor.result().release())  # after the rest of a stopped render
-        if self._executor is not None:
-            self._executor.shutdown(wait=False)
-            self._executor = None
+        ended, self._executor = self._executor, threads.pool(1)
+        ended.shutdown(wait=False)
         self._chosen = None
 
     def settle(self) -> None:
         """Forget everything if another device would be chosen now."""
-        try:
+        with suppress(NoDeviceError):  # raised again when a picture is asked for
             if self._chosen is None or self._chosen[0] == self._choose()[0]:
                 return
-        except NoDeviceError:
-            pass  # raised again when a picture is asked for
         self.forget()

@@ -35,16 +35,14 @@ class Claims:
         self._held: dict[str, int] = {}  # generation of each claim
         self._seen: dict[Path, tuple] = {}  # state of others' claims, and since when
         self._lock, self._ended = threading.Lock(), threading.Event()
-        self._thread: threading.Thread | None = None
+        self._thread = threads.daemon(self._touch)
 
     def __enter__(self) -> Self:
-        self._thread = threads.daemon(self._touch)
         return self
 
     def __exit__(self, *_: object) -> None:
         self._ended.set()
-        if self._thread is not None:
-            self._thread.join()
+        self._thread.join()
         for name in list(self._held):
             self.release(name)
 

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from ..messages import EffectError
 from . import keyframes, limits, mattes, motions, outlines, scribbles, shutters
 from .choices import BETWEEN, BLENDS, CHANNELS, COMBINES, CONTEXT, LENGTHS, MOTIONS, RAMPS, TIMINGS
-from .fields import MISSING, choice, color, fixed, number, switch
+from .fields import MISSING, choice, fixed, number, switch
 from .frame_state import EXTREMES, Combine, FrameState, Mode
 from .keyframes import Bars, Channel
 from .motions import Placement
@@ -311,8 +311,8 @@ class Shutter:
     """Bars over time, and how the exposed frames are combined. `follow`: what the exposure moves with."""
 
     name: str = fixed("Name", "Name of the shutter", default="Shutter", absent=MISSING, most=limits.MAX_NAME)
-    color: tuple[float, float, float] = color(
-        "Color", "Color of the shutter's bars, scribbles and matte", default=(0.8, 0.8, 0.8)
+    color: tuple[float, float, float] = fixed(
+        "Color", "Color of the shutter's bars, scribbles and matte", default=(0.8, 0.8, 0.8), subtype="COLOR_GAMMA"
     )
     bars: Bars
     follow: Subject | None = None
@@ -474,8 +474,7 @@ class Effect:
         camera = camera or self.camera
         new: dict[int, Subject] = {id(old): each for old, each in zip(self.regions, regions, strict=True)}
         new[id(self.camera)] = camera
-        followed = tuple(shutter.follow and new[id(shutter.follow)] for shutter in self.shutters)
-        shutters_ = tuple(replace(s, follow=follow) for s, follow in zip(self.shutters, followed, strict=True))
+        shutters_ = tuple(replace(each, follow=each.follow and new[id(each.follow)]) for each in self.shutters)
         return replace(self, shutters=shutters_, regions=tuple(regions), camera=camera)
 
     def for_picture(self, aspect: float, files: MatteFiles = lambda _region: mattes.NoFile()) -> Effect:

@@ -87,16 +87,10 @@ def choice(label: str, description: str, choices: Sequence[Choice], *, default: 
     return fixed(label, description, default=default, choices=choices, **more)
 
 
-def color(label: str, description: str, *, default: tuple[float, float, float], **more: Any) -> Any:
-    """Declare a color: red, green and blue display values, 0 to 1."""
-    return fixed(label, description, default=default, **({"subtype": "COLOR_GAMMA"} | more))
-
-
 def fixed(label: str, description: str, *, default: Any, made: Callable[[], Any] | None = None, **more: Any) -> Any:
-    """Declare a whole number or a text, without keys; `made` makes the model's value instead of `default`."""
-    said = {"absent": default, "blender": "", "recipe": None} | more
-    metadata = {"said": (label, description, default, said)}
-    return dataclasses.field(default_factory=made or (lambda: default), metadata=metadata)
+    """Declare a whole number, a text or a color, without keys; `made` makes the model's value instead of `default`."""
+    said = {"label": label, "description": description, "default": default, "absent": default} | more
+    return dataclasses.field(default_factory=made or (lambda: default), metadata=said)
 
 
 def fields_of(*kinds: type) -> dict[str, Field]:
@@ -106,12 +100,6 @@ def fields_of(*kinds: type) -> dict[str, Field]:
 
 @cache
 def _fields_of(kinds: tuple[type, ...]) -> dict[str, Field]:
-    found: dict[str, Field] = {}
-    for kind in kinds:
-        for each in dataclasses.fields(kind):
-            if "said" in each.metadata:
-                label, description, default, said = each.metadata["said"]
-                said = said | {"blender": said["blender"] or each.name}
-                said["recipe"] = each.name if said["recipe"] is None else said["recipe"]
-                found[each.name] = Field(label, description, default, **said)
-    return found
+    said = {each.name: each.metadata for kind in kinds for each in dataclasses.fields(kind) if each.metadata}
+    names: dict[str, dict[str, Any]] = {name: {"blender": name, "recipe": name} for name in said}
+    return {name: Field(**names[name] | said[name]) for name in said}

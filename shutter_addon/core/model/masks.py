@@ -128,17 +128,12 @@ def _outlines(spline: MaskSpline, width: int, height: int) -> tuple[np.ndarray, 
     return edge, _pixel_wide(edge, feather, 1 / min(width, height))
 
 
-def _longest_segment(points: np.ndarray, cyclic: bool) -> float:
-    """Return the length of the longest segment of a spline (n, 3, 2), along its handles."""
-    following = np.roll(points, -1, axis=0)
-    hull = np.stack([points[:, 1], points[:, 2], following[:, 0], following[:, 1]], axis=1)
-    lengths = np.linalg.norm(np.diff(hull, axis=1), axis=2).sum(axis=1)
-    return float(lengths[: None if cyclic else -1].max(initial=0))
-
-
 def _steps(spline: MaskSpline, points: np.ndarray, weights: np.ndarray, larger: int) -> int:
     """Return a segment's number of points: one in four pixels of the longest segment, more for changing feathers."""
-    longest = _longest_segment(points, spline.cyclic) * larger
+    following = np.roll(points, -1, axis=0)
+    hull = np.stack([points[:, 1], points[:, 2], following[:, 0], following[:, 1]], axis=1)
+    lengths = np.linalg.norm(np.diff(hull, axis=1), axis=2).sum(axis=1)  # of segments, along their handles
+    longest = float(lengths[: None if spline.cyclic else -1].max(initial=0)) * larger
     steepest = 0.0
     for weight, feather in zip(weights, spline.feathers, strict=True):
         u, factor = np.array([(0.0, weight), *feather]).T
@@ -178,7 +173,8 @@ def _offset(
     if not spline.cyclic:
         start = before & (segment == 0)
         along[start] = (following - points[0, 1])[start]
-    return edge + _left_of(along) * _widths(spline, weights, segment, u)[:, None]
+    left = _normalized(np.stack([-along[:, 1], along[:, 0]], axis=1))
+    return edge + left * _widths(spline, weights, segment, u)[:, None]
 
 
 def _widths(spline: MaskSpline, weights: np.ndarray, segment: np.ndarray, u: np.ndarray) -> np.ndarray:
@@ -214,11 +210,6 @@ def _feather_quads(edge: np.ndarray, feather: np.ndarray) -> np.ndarray:
 def _normalized(vectors: np.ndarray) -> np.ndarray:
     lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
     return vectors / np.where(lengths > 0, lengths, 1)
-
-
-def _left_of(vectors: np.ndarray) -> np.ndarray:
-    """Return unit vectors (n, 2) at a right angle to the left of vectors."""
-    return _normalized(np.stack([-vectors[:, 1], vectors[:, 0]], axis=1))
 
 
 def _fill(value: np.ndarray, polygons: list[np.ndarray], solver: str, holes: bool) -> None:

@@ -131,7 +131,7 @@ def unwound(placement: Placement, near: Placement) -> Placement:
 
 def between(first: Placement, second: Placement, share: float) -> Placement:
     """Return the placement a share 0 to 1 of the way between two, each number by itself, as between linear keys."""
-    numbers = (1 - share) * _numbers([first]) + share * _numbers([second])
+    numbers = (1 - share) * as_array([first]) + share * as_array([second])
     return _placement(numbers[0])
 
 
@@ -143,7 +143,7 @@ def only(placement: Placement, motion: Motion) -> Placement:
 
 def averaged(placements: Sequence[Placement], weights: np.ndarray) -> Placement:
     """Return the mean of placements, each number by itself, with weights (n,), Σ = 1."""
-    return _placement(weights @ _numbers(placements))
+    return _placement(weights @ as_array(placements))
 
 
 def thinned(
@@ -162,7 +162,7 @@ def thinned(
     frames = sorted(placements)
     if len(frames) < 3:
         return frames
-    numbers = _numbers([placements[frame] for frame in frames])
+    numbers = as_array([placements[frame] for frame in frames])
     far = _farthest(np.asarray(points, dtype=np.float64) * size)
     ends = [i for i, frame in enumerate(frames) if frame in kept or i in (0, len(frames) - 1)]
     chosen, spans = set(ends), list(pairwise(ends))
@@ -179,7 +179,7 @@ def thinned(
     return [frames[i] for i in sorted(chosen)]
 
 
-def _numbers(placements: Sequence[Placement]) -> np.ndarray:
+def as_array(placements: Sequence[Placement]) -> np.ndarray:
     """Return location, rotation and scale as an array (n, 4)."""
     return np.array([(*p.location, p.rotation, p.scale) for p in placements], dtype=np.float64)
 

@@ -73,20 +73,16 @@ def between_strokes(
     Strokes with equal numbers of points move point by point, others by arc length. A stroke without a partner stays
     until the next drawing.
     """
+    before, after = ([np.asarray(stroke, dtype=np.float64) for stroke in strokes] for strokes in (first, second))
     if u <= 0:
-        return [np.asarray(s, dtype=np.float64) for s in first]
+        return before
     if u >= 1:
-        return [np.asarray(s, dtype=np.float64) for s in second]
-    result = []
-    for index, a in enumerate(first):
-        a = np.asarray(a, dtype=np.float64)
-        if index < len(second):
-            b = np.asarray(second[index], dtype=np.float64)
-            if len(a) != len(b):
-                a, b = (resample(s, max(len(a), len(b)), aspect) for s in (a, b))
-            a = (1 - u) * a + u * b
-        result.append(a)
-    return result
+        return after
+    for index, (a, b) in enumerate(zip(before, after, strict=False)):
+        if len(a) != len(b):
+            a, b = (resample(stroke, max(len(a), len(b)), aspect) for stroke in (a, b))
+        before[index] = (1 - u) * a + u * b
+    return before
 
 
 def mapped(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:

@@ -140,11 +140,6 @@ def weights(start: np.ndarray, end: np.ndarray, dz: np.ndarray, window: int) -> 
     return np.diff(levels, axis=-1)
 
 
-def mix_exposure(shutters: ArrayLike, coefficients: ArrayLike) -> np.ndarray:
-    """Return e(q) = Σ cᵢ eᵢ for coefficients (…, N): the exposure (…) of the interpolated shutter."""
-    return np.asarray(coefficients) @ np.asarray(shutters).sum(axis=1)
-
-
 def displace(shutters: ArrayLike, coefficients: ArrayLike) -> np.ndarray:
     """Interpolate shutters (N, L) by displacement (paper §3.2, §3.4.1; exact).
 
@@ -152,13 +147,13 @@ def displace(shutters: ArrayLike, coefficients: ArrayLike) -> np.ndarray:
         coefficients: (…, N), Σc = 1, c ≥ 0.
 
     Returns:
-        Bars (…, L), whose sum is e(q).
+        Bars (…, L), whose sum is the exposure of the interpolated shutter, e(q) = Σ cᵢ eᵢ.
     """
     shutters = np.atleast_2d(np.asarray(shutters, dtype=np.float64))
     coefficients = np.asarray(coefficients, dtype=np.float64)
     table = knots(shutters)
     q = weights(coefficients @ table.start.T, coefficients @ table.end.T, np.diff(table.z), shutters.shape[1])
-    return q * mix_exposure(shutters, coefficients)[..., None]
+    return q * (coefficients @ shutters.sum(axis=1))[..., None]
 
 
 def mix(shutters: ArrayLike, coefficients: ArrayLike) -> np.ndarray:
@@ -166,7 +161,7 @@ def mix(shutters: ArrayLike, coefficients: ArrayLike) -> np.ndarray:
     shutters = np.atleast_2d(np.asarray(shutters, dtype=np.float64))
     coefficients = np.asarray(coefficients, dtype=np.float64)
     q = coefficients @ (shutters / shutters.sum(axis=1, keepdims=True))
-    return q * mix_exposure(shutters, coefficients)[..., None]
+    return q * (coefficients @ shutters.sum(axis=1))[..., None]
 
 
 INTERPOLATIONS = {"displacement": displace, "value": mix}

@@ -105,13 +105,10 @@ def _scribbles(
         drawn: Regions, later ones on top, each with 1 + its layer's number, or 0 without a layer.
         count: The number of layers.
     """
-    shapes = []
-    for number, region in drawn:
-        shape = _between(region, frame, share)
-        if shape.opacity > 0:
-            shapes.append(replace(shape, shutter=number, opacity=1.0))
+    placed = [(number, _between(region, frame, share)) for number, region in drawn]
+    shapes = tuple(replace(shape, shutter=number, opacity=1.0) for number, shape in placed if shape.opacity > 0)
     options = replace(state.options, edge_aware=float(effect.edge_aware.at(frame + round(share))))
-    return FrameState(options=options, bars=np.ones((1 + count, options.window)), shapes=tuple(shapes))
+    return FrameState(options=options, bars=np.ones((1 + count, options.window)), shapes=shapes)
 
 
 def _between(region: Region, frame: float, share: float) -> scribbles.Shape:

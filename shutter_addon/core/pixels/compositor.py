@@ -71,7 +71,8 @@ def compose(
         return mixed
     (combine,) = state.groups
     encoded = state.options.light == "encoded"
-    frames = [_encode(frame) if encoded else frame for frame in frames]
+    if encoded:
+        frames = [light.premultiplied(light.straight(each).clip(-_MOST, _MOST), light.to_encoded) for each in frames]
     y, x = np.indices(coefficients.shape[1:])
     pixels = x + 1j * y
 
@@ -170,16 +171,15 @@ def seen(frame: np.ndarray, places: np.ndarray, *, sharp: bool) -> np.ndarray:
         return frame[np.clip(row + j, 0, height - 1), np.clip(column + i, 0, width - 1)]
 
     across, down = _weights(x - column, sharp), _weights(y - row, sharp)
-    taps = range(-1, 3)
-    total = sum((across[i] * down[j])[..., None] * pixel(i, j) for i in taps for j in taps if sharp or {i, j} <= {0, 1})
+    total = sum((across[i] * down[j])[..., None] * pixel(i, j) for i in across for j in down)
     around = [pixel(i, j) for i in (0, 1) for j in (0, 1)]
     return np.clip(total, np.minimum.reduce(around), np.maximum.reduce(around))
 
 
 def _weights(t: np.ndarray, sharp: bool) -> dict[int, np.ndarray]:
-    """Return the weights of the pixels at −1, 0, 1 and 2 for a place between 0 and 1."""
+    """Return the weights of the pixels at −1, 0, 1 and 2, or of those at 0 and 1, for a place between 0 and 1."""
     if not sharp:
-        return {-1: 0 * t, 0: 1 - t, 1: t, 2: 0 * t}
+        return {0: 1 - t, 1: t}
     return {
         -1: -0.5 * t + t**2 - 0.5 * t**3,
         0: 1 - 2.5 * t**2 + 1.5 * t**3,
@@ -202,10 +202,6 @@ def _without_absent(q: np.ndarray, parts: np.ndarray, present: np.ndarray) -> np
     nearest = places[np.abs(centre[..., None] - CLOSE - (places + 0.5)).argmin(axis=-1)]
     alone = np.arange(len(present)) == nearest[..., None]
     return np.where(share > 1e-6, kept / np.maximum(share, 1e-6), parts[..., None] * alone)
-
-
-def _encode(frame: np.ndarray) -> np.ndarray:
-    return light.premultiplied(light.straight(frame).clip(-_MOST, _MOST), light.to_encoded)
 
 
 def _decode(total: np.ndarray) -> np.ndarray:

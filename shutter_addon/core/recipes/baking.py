@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..model import keyframes, limits
+from ..model import keyframes, limits, motions
 from ..model.effect import (
     Camera,
     Drawings,
@@ -126,7 +126,8 @@ def _said(part: Any, shown: range) -> dict[str, Any]:
     for name, each in fields_of(type(part)).items():
         value = getattr(part, name)
         if each.is_channel:
-            value = _number(value, shown) if each.keyed_in_recipe else Constant(_short(value.at(shown.start)))
+            is_keyed = each.keyed_in_recipe and isinstance(value, Samples)
+            value = _number_keys(value.at, value, shown) if is_keyed else Constant(_short(value.at(shown.start)))
         said[name] = value
     return said
 
@@ -160,12 +161,6 @@ def _keyed(eased: _Eased, value: Callable[[float], Any], shown: range) -> Keys:
     """Return keys at these frames; `value` gives the value at a timeline frame."""
     frames, eases = zip(*eased, strict=True)
     return Keys(tuple(_frame(frame, shown) for frame in frames), tuple(map(value, frames)), eases)
-
-
-def _number(channel: Channel, shown: range) -> Channel:
-    if isinstance(channel, Samples):
-        return _number_keys(channel.at, channel, shown)
-    return Constant(_short(channel.at(shown.start)))
 
 
 def _time(time: Channel, shown: range) -> SourceTime:
@@ -234,8 +229,9 @@ def _moves(moving: Subject, words: Mapping[float, Ease], shown: range) -> Moves:
     """Return location, rotation and scale with the recipe's keys; `words`: see `_keys`."""
     keys = []
     for frame, ease in _move_keys(moving, words, shown):
-        x, y, degrees, scale = _place(moving, frame)
-        placed = Placement((_short(x), _short(y)), _short_degrees(degrees), _short(scale))
+        there = moving.placement(frame)
+        x, y = map(_short, there.location)
+        placed = Placement((x, y), _short_degrees(there.rotation), _short(there.scale))
         keys.append((_frame(frame, shown), placed, ease))
     return Moves.keyed(keys)
 
@@ -251,17 +247,12 @@ def _move_keys(moving: Subject, words: Mapping[float, Ease], shown: range) -> _E
 
     @cache
     def place(frame: float) -> np.ndarray:
-        return _place(moving, frame)
+        return motions.as_array([moving.placement(frame)])[0]
 
     if not frames and tuple(place(shown.start)) != (0, 0, 0, 1):
         frames = {shown.start}
     fits = _straight(place, lambda largest: TOLERANCE * np.maximum(1, largest))
     return _keys(fits, eases.items(), sorted(frames), words, shown) if frames or sampled else []
-
-
-def _place(moving: Subject, frame: float) -> np.ndarray:
-    placed = moving.placement(frame)
-    return np.array([*placed.location, placed.rotation, placed.scale])
 
 
 def _drawings(drawings: Drawings, frame: float) -> dict[float, list[np.ndarray]]:

@@ -51,8 +51,7 @@ def check(recipe: Any) -> None:
         _check_exposure(shutter, place)
     points = 0
     for i, region in enumerate(recipe.regions):
-        there_is_none = f"there is no shutter {shown(region.shutter)}"
-        _require(region.shutter in places, f"regions[{i}].shutter", there_is_none)
+        _require(region.shutter in places, f"regions[{i}].shutter", f"there is no shutter {shown(region.shutter)}")
         points += _check_drawn(region, f"regions[{i}]")
     _require(points <= limits.MAX_POINTS, "regions", f"{points} points at once, the most are {limits.MAX_POINTS}")
 
@@ -74,12 +73,11 @@ def _check_exposure(shutter: Any, place: str) -> None:
         _require(shutter.follow, f"{place}.trail", "the shutter follows nothing that moves")
         _require(shutter.length == "bars", f"{place}.trail", "a shutter has one length")
     chooses = shutter.combine in EXTREMES
-    only = "only lightest and darkest have a threshold"
-    _require(chooses or shutter.threshold is None, f"{place}.threshold", only)
+    has_threshold = shutter.threshold is not None
+    _require(chooses or not has_threshold, f"{place}.threshold", "only lightest and darkest have a threshold")
     is_soft = isinstance(shutter.softness, list) or shutter.softness != 0
-    _require(shutter.threshold is not None or not is_soft, f"{place}.softness", "it has no threshold")
-    ways = chooses or not shutter.by_luminance
-    _require(ways, f"{place}.by_luminance", "only lightest and darkest use it")
+    _require(has_threshold or not is_soft, f"{place}.softness", "it has no threshold")
+    _require(chooses or not shutter.by_luminance, f"{place}.by_luminance", "only lightest and darkest use it")
 
 
 def _check_follow(follow: str | None, regions: list, place: str) -> None:

@@ -72,11 +72,7 @@ def _eases(moving: Subject) -> dict[float, Ease]:
 
 
 def _moves(
-    moving: Subject,
-    placements: Placements,
-    exact: Collection[int],
-    chosen: list[int],
-    eases: Mapping[float, Ease],
+    moving: Subject, placements: Placements, exact: Collection[int], chosen: list[int], eases: Mapping[float, Ease]
 ) -> Moves:
     """Return moves with keys for the chosen placements, in place of those from the first placement to the last.
 
@@ -125,7 +121,8 @@ def with_ends(value: Channel, keys: list[presence.Key], frames: range) -> Channe
         keys: See presence.keys.
     """
     if not isinstance(value, Keys):
-        return _channel([(key.frame, value.at(1) * key.value, key.ease) for key in keys]) if keys else value
+        scaled = [(key.frame, value.at(1) * key.value, key.ease) for key in keys]
+        return Keys(*zip(*scaled, strict=True)) if keys else value
     old = list(zip(value.frames, value.values, value.eases, strict=True))
     whole, first, last = max(value.values), frames[0], frames[-1]
     before, after = [key for key in old if key[0] < first], [key for key in old if key[0] > last]
@@ -134,8 +131,4 @@ def with_ends(value: Channel, keys: list[presence.Key], frames: range) -> Channe
     made = made if made and made[0][0] == first else [(first, start, "constant"), *made]
     held = [(first - 1, float(value.at(first - 1)), "constant")] if before and before[-1][0] < first - 1 else []
     back = [(last + 1, float(value.at(last + 1)), "linear")] if after and after[0][0] > last + 1 else []
-    return _channel([*before, *held, *made, *back, *after])
-
-
-def _channel(keys: list[tuple]) -> Keys:
-    return Keys(*zip(*keys, strict=True))
+    return Keys(*zip(*before, *held, *made, *back, *after, strict=True))
