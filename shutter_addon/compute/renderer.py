@@ -249,11 +249,6 @@ class Renderer:
             return ()
         return guide.guiding(request.index, request.state.options.step, shot)
 
-    @property
-    def _everywhere(self) -> int:
-        """The side in pixels of a block that covers the picture."""
-        return max(self.source.width, self.source.height)
-
     def _exposing(self, request: Request, labels: list[LabelLayer]) -> Request:
         """Return the request with only the shutter that holds everywhere, if there is one."""
         sole = _sole(request, labels)
@@ -261,28 +256,24 @@ class Renderer:
 
     def _loaded_window(self, request: Request, labels: list[LabelLayer]) -> Handle:
         """Return the window with all exposed frames loaded."""
-        window = self._window_for(request)
-        self._keep_guides(request)
-        exposing = self._exposing(request, labels)
-        shot = self.shot(exposing)
-        window.load(window_frames.positions(exposing, shot), exposing.state.options, shot)
-        self.is_short = window.sends
-        return window
-
-    def _kind_for(self, request: Request) -> tuple[int, bool, int, bool]:
-        """Return the window's length, whether it is for following exposures, the number of all shutters, and whether
-        sums of frames are enough."""
-        exposing = self._exposing(request, self.labels(request)).state
-        return request.state.options.window, exposing.following is not None, len(request.state.bars), exposing.averages
-
-    def _window_for(self, request: Request) -> Handle:
         kind = self._kind_for(request)
         if self._window is None or self._kind != kind or not self._window.is_open:
             self._drop_window()
             self._kind = kind
             source = self._layered.recent if self._layered else self.source  # the layers' windows read these frames too
             self._window = self.compositor.window(guide.NotedSource(source, self._guides), *kind)
+        self._keep_guides(request)
+        exposing = self._exposing(request, labels)
+        shot = self.shot(exposing)
+        self._window.load(window_frames.positions(exposing, shot), exposing.state.options, shot)
+        self.is_short = self._window.sends
         return self._window
+
+    def _kind_for(self, request: Request) -> tuple[int, bool, int, bool]:
+        """Return the window's length, whether it is for following exposures, the number of all shutters, and whether
+        sums of frames are enough."""
+        exposing = self._exposing(request, self.labels(request)).state
+        return request.state.options.window, exposing.following is not None, len(request.state.bars), exposing.averages
 
     def _keep_guides(self, request: Request) -> None:
         """Keep the frames that guide the diffusion of this picture and of the next ones."""
@@ -298,8 +289,8 @@ class Renderer:
         return Coefficients(self._with_mattes(request, labels), request.state.options.aggregate)
 
     def _constant(self, values: np.ndarray) -> Coefficients:
-        """Return one set of coefficients (N,) for the whole picture."""
-        return Coefficients(self._stages.upload(values[:, None, None]), self._everywhere)
+        """Return one set of coefficients (N,), in a block that covers the whole picture."""
+        return Coefficients(self._stages.upload(values[:, None, None]), max(self.source.width, self.source.height))
 
     def _with_mattes(self, request: Request, labels: list[LabelLayer]) -> Handle:
         """Return coefficients on the device, with mattes laid over those of scribbles. Kept until either changes."""
