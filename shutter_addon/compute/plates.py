@@ -123,18 +123,15 @@ class LayerColors:
         """
         picture = self._separated(frame, -1)[1] if self._separates else self._decoded(frame)
         seen = self._mattes.behind(self.layers, frame)
-        plate, kinds = self._plate(frame, seen < layering.UNCOVERED)
-        colors, share = uncovered(linear(picture, self._source)[..., :3], seen, plate, kinds)
-        return with_colors(picture, colors, kinds == TAKEN, self._source), share
-
-    def _plate(self, frame: int, covered: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return plate(
-            covered,
+        lacking, kinds = plate(
+            seen < layering.UNCOVERED,
             (other for other in nearest_frames(frame, self._options, self._shot) if other != frame),
             self.linear_part,
             partial(self._mattes.behind, self.layers),
             partial(self.motion, frame),
         )
+        colors, share = uncovered(linear(picture, self._source)[..., :3], seen, lacking, kinds)
+        return with_colors(picture, colors, kinds == TAKEN, self._source), share
 
     def motion(self, frame: int, other: int) -> tuple[complex, complex]:
         """Return how the camera's view moves from one frame to another."""
