@@ -167,9 +167,20 @@ class LayeredRenderer:
     def _plate(
         self, request: Request, exposed: list[Exposure], shot: range, gain: Callable[[], np.ndarray]
     ) -> np.ndarray | None:
-        """Return Behind.plate. gain: returns the brightness (H, W) of its pixels."""
-        layers, (bottom, *_) = request.state.layers, exposed
-        if layers is None or (holes := self._lacks(exposed)) is None:
+        """Return Behind.plate: needed where too little of what lies behind is exposed, and visible.
+
+        Args:
+            request: the picture
+            exposed: what lies behind, and the layers
+            shot: the source frames that windows may show
+            gain: returns the brightness (H, W) of its pixels
+        """
+        layers, (bottom, *own) = request.state.layers, exposed
+        if layers is None or self._stages.least_share(bottom) >= layering.CLEAR:
+            return None
+        holes = self._shares(bottom) < layering.CLEAR
+        holes &= layering.behind([self._shares(layer) for layer in own]) > _SEEN
+        if not holes.any():
             return None
         picture, kinds = plates.plate(
             holes,
@@ -188,15 +199,6 @@ class LayeredRenderer:
         if self._source.alpha == "opaque":
             picture[..., 3] = 1  # even if nothing is known
         return picture
-
-    def _lacks(self, exposed: list[Exposure]) -> np.ndarray | None:
-        """Return where (H, W) too little of what lies behind is exposed, and visible. None: nowhere."""
-        bottom, *own = exposed
-        if self._stages.least_share(bottom) >= layering.CLEAR:
-            return None
-        holes = self._shares(bottom) < layering.CLEAR
-        holes &= layering.behind([self._shares(layer) for layer in own]) > _SEEN
-        return holes if holes.any() else None
 
     def _shares(self, exposed: Exposure) -> np.ndarray:
         """Return the shares (H, W) of an exposure."""
