@@ -10,7 +10,6 @@ import numpy as np
 from ..core.frames.frame_source import FrameSource
 from ..core.model.frame_state import FrameState, Layers
 from ..core.model.mattes import MatteReader
-from ..core.model.windows import source_frames
 from ..core.pixels import layering
 from . import plates, window_frames
 from .guide import Guides, NotedSource
@@ -140,7 +139,7 @@ class LayeredRenderer:
     def _load(self, windows: dict, request: Request, shot: range) -> None:
         """Load all windows, a few frames at a time, so that each frame is read once for all windows."""
         options, ordered = request.state.options, np.sort(window_frames.positions(request, shot))
-        lacking = set(source_frames(options, ordered, shot).tolist()).difference(self.held)
+        lacking = window_frames.exposed_frames(request, shot).difference(self.held)
         step = plates.TOGETHER if len(lacking) > 1 else len(ordered)
         for end in range(step, len(ordered) + step, step):
             for window in windows.values():
