@@ -38,14 +38,15 @@ BLOCK = 20  # frames beyond a drawing that are carried together
 _PAUSE, _PATIENCE, _BEAT = 0.5, 20.0, 4.0
 
 
+Drawings = tuple[tuple[int, outlines.Curves], ...]  # source frames with the curves drawn there
+
+
 class CarriedMattes(SourceWrapper):
     """The mattes, a core.model.mattes.MatteSource; close it. Its frames are the source's filmed ones."""
 
     step = 1
 
-    def __init__(
-        self, source: FrameSource, drawings: tuple[tuple[int, outlines.Curves], ...], folder: Path | None = None
-    ) -> None:
+    def __init__(self, source: FrameSource, drawings: Drawings, folder: Path | None = None) -> None:
         """Read mattes that are carried from drawings; see subject_mattes.CarriedFile."""
         super().__init__(source)
         self._shots = source if isinstance(source, ShotSource) else ShotSource(source)

@@ -139,11 +139,11 @@ class SmoothSource(SourceWrapper):
     def _moment(self, pair: tuple[int, int], number: int) -> Decoded:
         """What is so many moments after the first of two frames."""
         steps = (pair[1] - pair[0]) * self.step
-        return self._pairs.ask(pair, lambda: self._between(pair), 2).moment(pair, number, steps)
 
-    def _between(self, pair: tuple[int, int]) -> flow.Between:
-        first, second = map(self._source.read, pair)
-        return flow.Between(first, second, self.transfer, self.alpha, self._find)
+        def between() -> flow.Between:
+            return flow.Between(*map(self._source.read, pair), self.transfer, self.alpha, self._find)
+
+        return self._pairs.ask(pair, between, 2).moment(pair, number, steps)
 
     def close(self) -> None:
         """Closes the file, and lets go of all frames."""
