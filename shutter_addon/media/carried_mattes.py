@@ -13,6 +13,7 @@ from contextlib import closing, contextmanager, suppress
 from dataclasses import replace
 from functools import cache, cached_property
 from pathlib import Path
+from threading import Lock
 
 import numpy as np
 from OpenImageIO import ImageSpec
@@ -228,7 +229,11 @@ def _writable(parent: Path | None, name: str) -> Path:
             if not (folder.is_symlink() and folder.is_dir()):  # derived.own_folder refuses a link
                 tempfile.TemporaryFile(dir=there).close()
             return folder
-    return Path(_temporary().name, name)
+    with _MAKING:
+        return Path(_temporary().name, name)
+
+
+_MAKING = Lock()  # or two threads would each make a folder
 
 
 @cache
