@@ -22,11 +22,6 @@ BLOCK = 16
 LEAST = read_pass("layer", "LEAST")
 
 
-def _in_fours(values: np.ndarray) -> np.ndarray:
-    """Return coefficients (N, h, w) as layers (⌈N/4⌉, h, w, 4) float32 of a texture."""
-    return np.moveaxis(padded(np.moveaxis(values, 0, -1)), 2, 0).astype(np.float32)
-
-
 class Stages:
     """request.Stages on a Device."""
 
@@ -48,7 +43,8 @@ class Stages:
     def upload(self, values: np.ndarray) -> Texture:
         """See request.Stages."""
         name = "constant" if values.shape[1:] == (1, 1) else "uploaded"
-        return self._textures.filled(name, _in_fours(values))
+        fours = np.moveaxis(padded(np.moveaxis(values, 0, -1)), 2, 0)  # layers (⌈N/4⌉, h, w, 4)
+        return self._textures.filled(name, fours.astype(np.float32))
 
     def add(self, mixed: Texture | None, added: Texture, share: float, size: tuple[int, int]) -> Texture:
         """See request.Stages."""
