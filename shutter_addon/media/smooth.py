@@ -141,7 +141,8 @@ class SmoothSource(SourceWrapper):
         steps = (pair[1] - pair[0]) * self.step
 
         def between() -> flow.Between:
-            return flow.Between(*map(self._source.read, pair), self.transfer, self.alpha, self._find)
+            first, second = map(self._source.read, pair)
+            return flow.Between(first, second, self.transfer, self.alpha, self._find)
 
         return self._pairs.ask(pair, between, 2).moment(pair, number, steps)
 
