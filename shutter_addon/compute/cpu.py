@@ -105,7 +105,7 @@ def _of_tile(coefficients: Coefficients, tile: Tile) -> np.ndarray:
 
 
 class CPUCompositor:
-    """request.Compositor and request.Stages with NumPy."""
+    """gpu.GPUCompositor and stages.Stages with NumPy."""
 
     name = "NumPy"
     takes_planes = False
