@@ -199,12 +199,8 @@ class LayerMattes:
 
         return self._kept.ask(key, made, self._most)
 
-    def clear(self) -> None:
-        """Forget all mattes."""
-        self._kept.clear()
-
     def close(self) -> None:
         """Forget all mattes, and close their files."""
-        self.clear()
+        self._kept.clear()
         if self._reader is not None:
             self._reader.close()
