@@ -133,13 +133,9 @@ class Renderer:
 
     def _layering(self) -> LayeredRenderer:
         if self._layered is None:
+            mattes = self._mattes and self._mattes.another()
             self._layered = LayeredRenderer(
-                self.compositor,
-                self._stages,
-                self.source,
-                self._guides,
-                self._mattes and self._mattes.another(),
-                self._solved_apart,
+                self.compositor, self._stages, self.source, self._guides, mattes, self._solved_apart
             )
         return self._layered
 
@@ -393,13 +389,9 @@ def sole_of(layers: list[LabelLayer]) -> int | None:
 
 def _layer(share: float, labels: np.ndarray) -> LabelLayer:
     digest = hashlib.blake2b(np.ascontiguousarray(labels), digest_size=16).digest()
-    return LabelLayer(share=share, labels=labels, sole=_shutter_of(labels), key=(share, labels.shape, digest))
-
-
-def _shutter_of(labels: np.ndarray) -> int | None:
-    """Return the only shutter of the scribbles, 0 without scribbles, or None. It holds everywhere."""
     highest = int(labels.max())
-    if highest == scribbles.FREE:
-        return 0
-    lowest = int((labels - np.uint16(1)).min())  # the lowest shutter: 0 of a free pixel wraps around to 65,535
-    return lowest if lowest == highest - 1 else None
+    sole: int | None = 0  # without scribbles, the first shutter holds everywhere
+    if highest != scribbles.FREE:
+        lowest = int((labels - np.uint16(1)).min())  # the lowest shutter: 0 of a free pixel wraps around to 65,535
+        sole = lowest if lowest == highest - 1 else None
+    return LabelLayer(share=share, labels=labels, sole=sole, key=(share, labels.shape, digest))
