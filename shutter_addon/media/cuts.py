@@ -100,22 +100,19 @@ def is_cut(before: list[Signature], after: list[Signature]) -> bool:
         return False
     passing = [(earlier, after[0]) for earlier in before[-PASSING - 1 : -1]]
     passing += [(before[-1], later) for later in after[1 : PASSING + 1]]
-    stands_out = all(may_be_cut(*pair) for pair in passing) and _stands_out(_moving(before[::-1]), _moving(after))
-    return stands_out and _all_changes(before[-1], after[0])
+    if not all(may_be_cut(*pair) for pair in passing) or not _stands_out(_moving(before[::-1]), _moving(after)):
+        return False
+    last, first = before[-1], after[0]
+    jumps = product(*(range(-(length // REACH), length // REACH + 1) for length in first.shape[:2]))
+    # Parts that are black do not count.
+    return all(_differ(*parts, 0.0, PART) for parts in zip(_parts(last), _parts(first), strict=True)) and all(
+        _unlike(_shared(last, y, x), _shared(first, -y, -x)) >= MOVED for y, x in jumps
+    )
 
 
 def may_be_cut(before: Signature, after: Signature) -> bool:
     """Return whether these two neighbors allow a cut between them."""
     return _differ(before, after, NOISE) and _unlike(before, after) >= APART
-
-
-def _all_changes(before: Signature, after: Signature) -> bool:
-    """Return whether brightness changes in every part that is not black, and the pictures have nothing in common for
-    any jump of the camera."""
-    jumps = product(*(range(-(length // REACH), length // REACH + 1) for length in before.shape[:2]))
-    return all(_differ(*parts, 0.0, PART) for parts in zip(_parts(before), _parts(after), strict=True)) and all(
-        _unlike(_shared(before, y, x), _shared(after, -y, -x)) >= MOVED for y, x in jumps
-    )
 
 
 def _parts(picture: Signature) -> list[Signature]:
