@@ -5,6 +5,7 @@ Powers on devices differ in their last bits. So the device evaluates parabolas, 
 pixels that are too near to the end of a level. For those, about one in a hundred, the display itself is used.
 """
 
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any, TypeAlias
 
@@ -15,7 +16,7 @@ from ..core.memo import Memo
 from ..core.model import windows
 from ..core.model.frame_state import AVERAGE, Combine, Following, FrameState
 from ..core.pixels.shown_levels import Display
-from ..devices.device import Device, Given, NamedTextures, Texture
+from ..devices.device import Device, Given, NamedTextures, NoDeviceError, Texture
 from ..devices.llvmpipe import MOST_ITERATIONS, median_iterations
 from ..devices.passes import Pass, read_pass
 from . import cpu, window_frames
@@ -31,10 +32,11 @@ from .composition_passes import (
     table,
     way_of,
 )
+from .layer_frames import WeightedFrames
 from .request import Coefficients, Handle, Request
-from .running_sums import STORED_SUMS, Sums, open_window
+from .running_sums import STORED_SUMS, Sums, WeightedSums
 from .stages import Stages
-from .window import BLOCK, PackedFrames, WholeFrames, Window
+from .window import BLOCK, Frames, PackedFrames, WholeFrames, Window, summable
 
 # LEVELS_OF of shaders/include/combine.glsl for a format of frames.
 _LEVELS_OF = {"rgba8": 0, "rgba16": 1}
@@ -178,8 +180,24 @@ class GPUCompositor:
     def window(
         self, source: FrameSource, capacity: int, moved: bool = False, shutters: int = 4, summed: bool = True
     ) -> Window:
-        """Return a window of frames (running_sums.open_window)."""
-        return open_window(self.device, source, capacity, moved, shutters, summed)
+        """Return the fastest window: running sums if the source allows them and the device has room, else frames.
+
+        Args:
+            source: the footage
+            capacity: the most frames in the window
+            moved: exposures follow something, so each frame has to be whole
+            shutters: the shutters whose coefficients need room beside the window
+            summed: pictures are only made of sums of the frames
+        """
+        size = self.device, source, capacity, shutters
+        if moved:
+            return PackedFrames(*size) if summable(source) else WholeFrames(*size)
+        with suppress(NoDeviceError):
+            if summed and isinstance(source, WeightedFrames) and source.is_summable:
+                return WeightedSums(self.device, source, capacity, shutters)
+            if summed and summable(source):
+                return Sums(*size)
+        return Frames(*size)
 
     def stages(self) -> Stages:
         return Stages(self.device)
