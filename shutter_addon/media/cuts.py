@@ -172,16 +172,12 @@ def _whole(picture: np.ndarray) -> np.ndarray:
 
 def _hash(picture: np.ndarray) -> np.ndarray:
     """Return which of the lowest frequencies are above their median."""
-    small = _resized((_whole(picture) @ _GREY + (1 << 14)) >> 15, 2 * BITS)
+    grey = (_whole(picture) @ _GREY + (1 << 14)) >> 15
+    down, right = (_means(length, 2 * BITS) for length in grey.shape)
+    small = np.rint(down @ grey @ right.T)  # like OpenCV's INTER_AREA except for rounding
     waves = _waves(2 * BITS)[:BITS]
     low = np.float32(waves @ np.float32(small / max(small.max(), 1)) @ waves.T)
     return np.greater(low, np.median(low))
-
-
-def _resized(grey: np.ndarray, size: int) -> np.ndarray:
-    """Return a picture resized to a square by means, like OpenCV's INTER_AREA except for rounding."""
-    down, right = (_means(length, size) for length in grey.shape)
-    return np.rint(down @ grey @ right.T)
 
 
 @lru_cache(16)
