@@ -73,7 +73,7 @@ class CarriedMattes(SourceWrapper):
     def has(self, index: int) -> bool:
         """Whether a frame's matte is kept already; its file is not opened."""
         near = self._near(index)
-        return near == (None, None) or derived.is_kept(self._path(index, *near))
+        return near == (None, None) or derived.size_of(self._path(index, *near)) is not None
 
     def confidence(self, index: int) -> float | None:
         """How sure a frame's matte is (carrying.Carried); None: it is not kept yet."""
@@ -128,7 +128,7 @@ class CarriedMattes(SourceWrapper):
         with Claims(path.parent, _PATIENCE, _BEAT) as claims:
             try:
                 derived.own_folder(path.parent)
-                while not claims.take(name) and not derived.is_kept(path):
+                while not claims.take(name) and derived.size_of(path) is None:
                     stopping.check()
                     time.sleep(_PAUSE)
             except OSError as error:
@@ -201,7 +201,7 @@ class CarriedMattes(SourceWrapper):
         """The file of a frame's matte, made of these drawings."""
         key = derived.key({"version": VERSION, "frame": index, "drawn": self._drawn(first, last)})
         name = f"{index:08d}-{key}.png"
-        if self._parent and derived.is_kept(kept := self._parent / self._folder / name):
+        if self._parent and derived.size_of(kept := self._parent / self._folder / name) is not None:
             return kept
         return _writable(self._parent, self._folder) / name
 
