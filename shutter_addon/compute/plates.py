@@ -104,13 +104,10 @@ class LayerColors:
     def _separate(self, frame: int, number: int) -> tuple[np.ndarray, np.ndarray]:
         mattes = self._mattes.edges(self.layers, frame)
         matte = 1 - layering.behind(mattes) if number < 0 else mattes[number]
-        picture, mixed = self._decoded(frame), (matte > 0) & (matte < 1)
+        picture, mixed = as_rgba(self._source.decoded(frame)), (matte > 0) & (matte < 1)
         colors = linear(picture, self._source)[..., :3]
         own, behind = (with_colors(picture, c, mixed, self._source) for c in layering.separated(colors, matte))
         return own, behind
-
-    def _decoded(self, frame: int) -> np.ndarray:
-        return as_rgba(self._source.decoded(frame))
 
     def _uncovered(self, frame: int) -> tuple[np.ndarray, np.ndarray]:
         return self._memo(frame, "behind", lambda: self._uncover(frame))
@@ -121,7 +118,7 @@ class LayerColors:
         What layers cover comes from other frames, moved by the camera: where it pans, the frames that show a place are
         no fair sample of the exposure.
         """
-        picture = self._separated(frame, -1)[1] if self._separates else self._decoded(frame)
+        picture = self._separated(frame, -1)[1] if self._separates else as_rgba(self._source.decoded(frame))
         seen = self._mattes.behind(self.layers, frame)
         lacking, kinds = plate(
             seen < layering.UNCOVERED,
