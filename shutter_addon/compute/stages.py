@@ -10,7 +10,6 @@ from ..core.model.mattes import Matte
 from ..devices.device import Device, Given, NamedTextures, Texture
 from ..devices.passes import read_pass
 from .composition_passes import padded
-from .diffusion import follows_edges
 from .diffusion_gpu import Diffusion
 from .edge_diffusion_gpu import EdgeDiffusion
 from .request import Behind, Exposure
@@ -41,7 +40,7 @@ class Stages:
             guided: its guide and strength, or nothing
             warm: whether it may start from the last coefficients
         """
-        if guided and follows_edges(labels, *guided):
+        if guided and 0 < np.count_nonzero(labels) < labels.size:  # else nothing is diffused
             self._plain.release()
             return self._edged.solve(labels, count, *guided)
         self._edged.release()
