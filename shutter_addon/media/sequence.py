@@ -235,8 +235,7 @@ def by_number(path: Path, *, listed: bool = False) -> Callable[[int], Path] | No
     Args:
         path: the first file
         listed: the folder's files decide which number counts (MediaError: it cannot be listed); else it is the last
-        one,
-            as in Blender's movie clips
+            one, as in Blender's movie clips
     """
     parts = _frame_number(path)[0] if listed else next(iter(_numbers(path.stem)), None)
     if parts is None:
