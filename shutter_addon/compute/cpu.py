@@ -96,16 +96,8 @@ def _tiles(source: FrameSource) -> Iterator[Tile]:
             yield slice(top, min(top + TILE, source.height)), slice(left, min(left + TILE, source.width))
 
 
-def _of_tile(coefficients: Coefficients, tile: Tile) -> np.ndarray:
-    """Return the coefficients (N, h, w) of a tile's pixels, with a sum of 1."""
-    values, block = coefficients
-    rows, columns = (np.arange(pixels.start, pixels.stop) // block for pixels in tile)
-    c = np.maximum(values[:, rows[:, None], columns], 0, dtype=np.float64)
-    return c / c.sum(axis=0)
-
-
 class CPUCompositor:
-    """request.Compositor and request.Stages with NumPy."""
+    """gpu.GPUCompositor and stages.Stages with NumPy."""
 
     name = "NumPy"
     takes_planes = False
@@ -173,13 +165,15 @@ class CPUCompositor:
         state, source = request.state, window.source
         indices = windows.indices(state.options, request.index, window.shot, request.direction)
         moves = None if state.following is None else state.following.at(indices)
-        coefficients = Coefficients(coefficients.handle[: len(state.bars)], coefficients.block)
+        values, block = coefficients.handle[: len(state.bars)], coefficients.block
         picture = np.empty((source.height, source.width, 4), np.float32)
         for tile in _tiles(source):
             stopping.check()
             frames, moved = window.seen(indices, tile, moves)
-            c, sharp = _of_tile(coefficients, tile), source.alpha == "opaque"
-            made = compositor.compose(state, frames, indices >= 0, c, moved, sharp)
+            rows, columns = (np.arange(pixels.start, pixels.stop) // block for pixels in tile)
+            shares = np.maximum(values[:, rows[:, None], columns], 0, dtype=np.float64)
+            shares /= shares.sum(axis=0)
+            made = compositor.compose(state, frames, indices >= 0, shares, moved, source.alpha == "opaque")
             picture[tile] = made.clip(-LARGEST, LARGEST)
         return self.over_black(picture) if request.levels else picture
 

@@ -33,7 +33,7 @@ def diffuse(labels: np.ndarray, count: int, guide: np.ndarray | None = None, str
         labels: (H, W): 0 free, 1 + shutter fixed
         count: the number of shutters
         guide: (h, w, 3 or more), as for core.pixels.conductances; its cells are 1, 2, 4, … pixels wide
-        strength: 0 … 1, how much conductances follow the guide
+        strength: up to 1, how much conductances follow the guide
     """
     drawn = np.flatnonzero(np.bincount(labels.ravel(), minlength=count + 1)[1:])  # the others are 0 everywhere
     coefficients = np.zeros((count, *labels.shape), np.float32)
@@ -42,7 +42,7 @@ def diffuse(labels: np.ndarray, count: int, guide: np.ndarray | None = None, str
         return coefficients
     height, width = labels.shape
     across, down = np.ones((height, width - 1), np.float32), np.ones((height - 1, width), np.float32)
-    if guide is not None and strength > 0:
+    if guide is not None:
         across, down = (ties.astype(np.float32) for ties in conductances(guide, strength, labels.shape))
     *solved, last = drawn  # the last one gets the rest
     coefficients[solved] = _solved(labels, np.array(solved), across, down)
@@ -50,11 +50,6 @@ def diffuse(labels: np.ndarray, count: int, guide: np.ndarray | None = None, str
     coefficients[coefficients < NOTHING] = 0
     coefficients /= coefficients.sum(axis=0)
     return coefficients
-
-
-def follows_edges(labels: np.ndarray, guide: np.ndarray | None, strength: float) -> bool:
-    """Return whether anything is diffused with conductances other than 1."""
-    return guide is not None and strength > 0 and 0 < int(np.count_nonzero(labels)) < labels.size
 
 
 class _Grid(NamedTuple):

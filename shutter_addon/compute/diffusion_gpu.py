@@ -235,7 +235,9 @@ class Diffusion:
             return
         sweeps = FINEST_SWEEPS if grid.finest else SWEEPS
         self._smooth(grid, sweeps)
-        self._hand_down(grid, *coarser)
+        images = {"from": grid.textures["solution"], "to": grid.textures["own"]}
+        self._prolong(grid, coarser[0], "near", images, -1.0)  # W from U
+        self._restrict(grid, coarser[0], grid.textures["own"])
         self._correct(index + 1)
         self._take_up(grid, coarser[0], "reached")
         self._smooth(grid, sweeps, back=self.returns)
@@ -249,12 +251,6 @@ class Diffusion:
 
     def _solve_coarsest(self, grid: _Grid) -> None:
         self._run(_SOLVE, grid, "near", 1, grid.layers)  # it has one tile
-
-    def _hand_down(self, grid: _Grid, coarse: _Grid) -> None:
-        """Make W from U, and the next grid's right side from W."""
-        images = {"from": grid.textures["solution"], "to": grid.textures["own"]}
-        self._prolong(grid, coarse, "near", images, -1.0)
-        self._restrict(grid, coarse, grid.textures["own"])
 
     def _take_up(self, grid: _Grid, coarse: _Grid, tiles: str) -> None:
         """Set U to W + P U', where U' is the next grid's solution."""
@@ -296,13 +292,11 @@ class Diffusion:
                 coarse = self._grids[index + 1]
                 below: Given = {"coarse": coarse.size, "coarser": coarse.textures["solution"]}
                 self._run(_EXPAND, grid, "far", 16, grid.layers, **below)
-                beyond = tuple(-(2 * m + 1) / (4 * m + 8) for m in self._margin(index))
+                sizes = zip(self._grids[0].size, grid.size, strict=True)
+                # How far the picture's edge lies beyond the centers of the grid's last cells, in cells.
+                margins = [(pixels - 0.5) / 2**index - (cells - 1) for pixels, cells in sizes]
+                beyond = tuple(-(2 * margin + 1) / (4 * margin + 8) for margin in margins)
                 self._run(_EXPAND_RIM, grid, "rim", 16, **below, beyond=beyond)
-
-    def _margin(self, index: int) -> list[float]:
-        """Return how far the picture's edge lies beyond the centers of the grid's last cells: [x, y] in cells."""
-        sizes = zip(self._grids[0].size, self._grids[index].size, strict=True)
-        return [(pixels - 0.5) / 2**index - (cells - 1) for pixels, cells in sizes]
 
     def _run(self, program: Pass, grid: _Grid, tiles: str, cells: int, layers: int = 1, **extra: Any) -> None:
         """Run a pass over a list of the grid's tiles.

@@ -12,7 +12,7 @@ from ..core.frames.frame_source import FrameSource, SourceWrapper
 from ..core.frames.planes import Decoded
 from ..core.memo import Kept
 from ..core.model.frame_state import FrameState, Layers
-from ..core.model.mattes import FileFrame, Matte, MatteReader, Ramp
+from ..core.model.mattes import FileFrame, MatteReader, Ramp
 from ..core.pixels import layering
 from ..core.stopping import kept
 
@@ -161,7 +161,11 @@ class LayerMattes:
         place = self._place(layers, frame)
         drawn, matte = layers.scribbles[place], layers.mattes[place][layer]
         if matte is not None:
-            value = self._read(matte, frame)
+            reader = self._reader
+            assert reader is not None
+            moves = frame if isinstance(matte.content, FileFrame) else None
+            key = matte.content, matte.feather, matte.invert, moves
+            value = self._get(key, lambda: reader.values((matte,), frame, 1)[0][1])
         elif drawn is not None:
             value = self._drawn(drawn, frame, layer)
         return value.astype(np.float32) / np.float32(_WHOLE)
@@ -169,13 +173,6 @@ class LayerMattes:
     def behind(self, layers: Layers, frame: int) -> np.ndarray:
         """Return how much (H, W) float32 of what lies behind all layers a source frame shows."""
         return layering.behind(self.of(layers, frame))
-
-    def _read(self, matte: Matte, frame: int) -> np.ndarray:
-        reader = self._reader
-        assert reader is not None
-        moves = frame if isinstance(matte.content, FileFrame) else None
-        key = matte.content, matte.feather, matte.invert, moves
-        return self._get(key, lambda: reader.values((matte,), frame, 1)[0][1])
 
     def _drawn(self, state: FrameState, frame: int, layer: int) -> np.ndarray:
         """Return the matte of a drawn layer. Unless it follows edges, it does not depend on the frame."""
@@ -199,12 +196,8 @@ class LayerMattes:
 
         return self._kept.ask(key, made, self._most)
 
-    def clear(self) -> None:
-        """Forget all mattes."""
-        self._kept.clear()
-
     def close(self) -> None:
         """Forget all mattes, and close their files."""
-        self.clear()
+        self._kept.clear()
         if self._reader is not None:
             self._reader.close()

@@ -10,12 +10,14 @@ import numpy as np
 from ..core.frames.frame_source import FrameSource
 from ..core.model.frame_state import FrameState, Layers
 from ..core.model.mattes import MatteReader
-from ..core.model.windows import source_frames
 from ..core.pixels import layering
 from . import plates, window_frames
+from .cpu import CPUCompositor
+from .gpu import Compositor
 from .guide import Guides, NotedSource
 from .layer_frames import LayerMattes, RecentFrames, WeightedFrames
-from .request import Behind, Coefficients, Compositor, Exposure, Handle, Request, Stages
+from .request import Behind, Coefficients, Exposure, Handle, Request
+from .stages import Stages
 from .window import summable
 
 # The parts of a picture: {(layer, −1 for what lies behind; whether only weights are composed): request}.
@@ -39,7 +41,7 @@ class LayeredRenderer:
     def __init__(
         self,
         compositor: Compositor,
-        stages: Stages,
+        stages: Stages | CPUCompositor,
         source: FrameSource,
         guides: Guides,
         mattes: MatteReader | None,
@@ -140,7 +142,7 @@ class LayeredRenderer:
     def _load(self, windows: dict, request: Request, shot: range) -> None:
         """Load all windows, a few frames at a time, so that each frame is read once for all windows."""
         options, ordered = request.state.options, np.sort(window_frames.positions(request, shot))
-        lacking = set(source_frames(options, ordered, shot).tolist()).difference(self.held)
+        lacking = window_frames.exposed_frames(request, shot).difference(self.held)
         step = plates.TOGETHER if len(lacking) > 1 else len(ordered)
         for end in range(step, len(ordered) + step, step):
             for window in windows.values():
@@ -167,9 +169,20 @@ class LayeredRenderer:
     def _plate(
         self, request: Request, exposed: list[Exposure], shot: range, gain: Callable[[], np.ndarray]
     ) -> np.ndarray | None:
-        """Return Behind.plate. gain: returns the brightness (H, W) of its pixels."""
-        layers, (bottom, *_) = request.state.layers, exposed
-        if layers is None or (holes := self._lacks(exposed)) is None:
+        """Return Behind.plate: needed where too little of what lies behind is exposed, and visible.
+
+        Args:
+            request: the picture
+            exposed: what lies behind, and the layers
+            shot: the source frames that windows may show
+            gain: returns the brightness (H, W) of its pixels
+        """
+        layers, (bottom, *own) = request.state.layers, exposed
+        if layers is None or self._stages.least_share(bottom) >= layering.CLEAR:
+            return None
+        holes = self._shares(bottom) < layering.CLEAR
+        holes &= layering.behind([self._shares(layer) for layer in own]) > _SEEN
+        if not holes.any():
             return None
         picture, kinds = plates.plate(
             holes,
@@ -188,15 +201,6 @@ class LayeredRenderer:
         if self._source.alpha == "opaque":
             picture[..., 3] = 1  # even if nothing is known
         return picture
-
-    def _lacks(self, exposed: list[Exposure]) -> np.ndarray | None:
-        """Return where (H, W) too little of what lies behind is exposed, and visible. None: nowhere."""
-        bottom, *own = exposed
-        if self._stages.least_share(bottom) >= layering.CLEAR:
-            return None
-        holes = self._shares(bottom) < layering.CLEAR
-        holes &= layering.behind([self._shares(layer) for layer in own]) > _SEEN
-        return holes if holes.any() else None
 
     def _shares(self, exposed: Exposure) -> np.ndarray:
         """Return the shares (H, W) of an exposure."""

@@ -104,13 +104,10 @@ class LayerColors:
     def _separate(self, frame: int, number: int) -> tuple[np.ndarray, np.ndarray]:
         mattes = self._mattes.edges(self.layers, frame)
         matte = 1 - layering.behind(mattes) if number < 0 else mattes[number]
-        picture, mixed = self._decoded(frame), (matte > 0) & (matte < 1)
+        picture, mixed = as_rgba(self._source.decoded(frame)), (matte > 0) & (matte < 1)
         colors = linear(picture, self._source)[..., :3]
         own, behind = (with_colors(picture, c, mixed, self._source) for c in layering.separated(colors, matte))
         return own, behind
-
-    def _decoded(self, frame: int) -> np.ndarray:
-        return as_rgba(self._source.decoded(frame))
 
     def _uncovered(self, frame: int) -> tuple[np.ndarray, np.ndarray]:
         return self._memo(frame, "behind", lambda: self._uncover(frame))
@@ -121,20 +118,17 @@ class LayerColors:
         What layers cover comes from other frames, moved by the camera: where it pans, the frames that show a place are
         no fair sample of the exposure.
         """
-        picture = self._separated(frame, -1)[1] if self._separates else self._decoded(frame)
+        picture = self._separated(frame, -1)[1] if self._separates else as_rgba(self._source.decoded(frame))
         seen = self._mattes.behind(self.layers, frame)
-        plate, kinds = self._plate(frame, seen < layering.UNCOVERED)
-        colors, share = uncovered(linear(picture, self._source)[..., :3], seen, plate, kinds)
-        return with_colors(picture, colors, kinds == TAKEN, self._source), share
-
-    def _plate(self, frame: int, covered: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return plate(
-            covered,
+        lacking, kinds = plate(
+            seen < layering.UNCOVERED,
             (other for other in nearest_frames(frame, self._options, self._shot) if other != frame),
             self.linear_part,
             partial(self._mattes.behind, self.layers),
             partial(self.motion, frame),
         )
+        colors, share = uncovered(linear(picture, self._source)[..., :3], seen, lacking, kinds)
+        return with_colors(picture, colors, kinds == TAKEN, self._source), share
 
     def motion(self, frame: int, other: int) -> tuple[complex, complex]:
         """Return how the camera's view moves from one frame to another."""
@@ -244,10 +238,8 @@ def filled(picture: np.ndarray, known: np.ndarray) -> np.ndarray:
 def _doubled(picture: np.ndarray) -> np.ndarray:
     """Return the picture at twice its size, linear between the centers of pixels."""
     for axis in (0, 1):
-        before = np.concatenate([picture.take([0], axis), picture.take(range(picture.shape[axis] - 1), axis)], axis)
-        after = np.concatenate([picture.take(range(1, picture.shape[axis]), axis), picture.take([-1], axis)], axis)
-        pairs = np.stack([0.75 * picture + 0.25 * before, 0.75 * picture + 0.25 * after], axis + 1)
-        shape = list(picture.shape)
-        shape[axis] *= 2
-        picture = pairs.reshape(shape)
+        count = picture.shape[axis]
+        own = np.arange(count).repeat(2)
+        beside = (own + np.tile((-1, 1), count)).clip(0, count - 1)
+        picture = 0.75 * picture.take(own, axis) + 0.25 * picture.take(beside, axis)
     return picture.astype(np.float32)

@@ -17,9 +17,9 @@ from ..core.model.mattes import MatteReader
 from ..devices.device import Budget, NoDeviceError
 from . import guide, window_frames
 from .cpu import CPUCompositor
-from .gpu import GPUCompositor
+from .gpu import Compositor, GPUCompositor
 from .layered_renderer import LayeredRenderer
-from .request import Coefficients, Compositor, Handle, Request
+from .request import Coefficients, Handle, Request
 
 if TYPE_CHECKING:
     from ..devices.gl import GLDevice
@@ -133,13 +133,9 @@ class Renderer:
 
     def _layering(self) -> LayeredRenderer:
         if self._layered is None:
+            mattes = self._mattes and self._mattes.another()
             self._layered = LayeredRenderer(
-                self.compositor,
-                self._stages,
-                self.source,
-                self._guides,
-                self._mattes and self._mattes.another(),
-                self._solved_apart,
+                self.compositor, self._stages, self.source, self._guides, mattes, self._solved_apart
             )
         return self._layered
 
@@ -249,11 +245,6 @@ class Renderer:
             return ()
         return guide.guiding(request.index, request.state.options.step, shot)
 
-    @property
-    def _everywhere(self) -> int:
-        """The side in pixels of a block that covers the picture."""
-        return max(self.source.width, self.source.height)
-
     def _exposing(self, request: Request, labels: list[LabelLayer]) -> Request:
         """Return the request with only the shutter that holds everywhere, if there is one."""
         sole = _sole(request, labels)
@@ -261,28 +252,24 @@ class Renderer:
 
     def _loaded_window(self, request: Request, labels: list[LabelLayer]) -> Handle:
         """Return the window with all exposed frames loaded."""
-        window = self._window_for(request)
-        self._keep_guides(request)
-        exposing = self._exposing(request, labels)
-        shot = self.shot(exposing)
-        window.load(window_frames.positions(exposing, shot), exposing.state.options, shot)
-        self.is_short = window.sends
-        return window
-
-    def _kind_for(self, request: Request) -> tuple[int, bool, int, bool]:
-        """Return the window's length, whether it is for following exposures, the number of all shutters, and whether
-        sums of frames are enough."""
-        exposing = self._exposing(request, self.labels(request)).state
-        return request.state.options.window, exposing.following is not None, len(request.state.bars), exposing.averages
-
-    def _window_for(self, request: Request) -> Handle:
         kind = self._kind_for(request)
         if self._window is None or self._kind != kind or not self._window.is_open:
             self._drop_window()
             self._kind = kind
             source = self._layered.recent if self._layered else self.source  # the layers' windows read these frames too
             self._window = self.compositor.window(guide.NotedSource(source, self._guides), *kind)
+        self._keep_guides(request)
+        exposing = self._exposing(request, labels)
+        shot = self.shot(exposing)
+        self._window.load(window_frames.positions(exposing, shot), exposing.state.options, shot)
+        self.is_short = self._window.sends
         return self._window
+
+    def _kind_for(self, request: Request) -> tuple[int, bool, int, bool]:
+        """Return the window's length, whether it is for following exposures, the number of all shutters, and whether
+        sums of frames are enough."""
+        exposing = self._exposing(request, self.labels(request)).state
+        return request.state.options.window, exposing.following is not None, len(request.state.bars), exposing.averages
 
     def _keep_guides(self, request: Request) -> None:
         """Keep the frames that guide the diffusion of this picture and of the next ones."""
@@ -298,8 +285,8 @@ class Renderer:
         return Coefficients(self._with_mattes(request, labels), request.state.options.aggregate)
 
     def _constant(self, values: np.ndarray) -> Coefficients:
-        """Return one set of coefficients (N,) for the whole picture."""
-        return Coefficients(self._stages.upload(values[:, None, None]), self._everywhere)
+        """Return one set of coefficients (N,), in a block that covers the whole picture."""
+        return Coefficients(self._stages.upload(values[:, None, None]), max(self.source.width, self.source.height))
 
     def _with_mattes(self, request: Request, labels: list[LabelLayer]) -> Handle:
         """Return coefficients on the device, with mattes laid over those of scribbles. Kept until either changes."""
@@ -402,13 +389,9 @@ def sole_of(layers: list[LabelLayer]) -> int | None:
 
 def _layer(share: float, labels: np.ndarray) -> LabelLayer:
     digest = hashlib.blake2b(np.ascontiguousarray(labels), digest_size=16).digest()
-    return LabelLayer(share=share, labels=labels, sole=_shutter_of(labels), key=(share, labels.shape, digest))
-
-
-def _shutter_of(labels: np.ndarray) -> int | None:
-    """Return the only shutter of the scribbles, 0 without scribbles, or None. It holds everywhere."""
     highest = int(labels.max())
-    if highest == scribbles.FREE:
-        return 0
-    lowest = int((labels - np.uint16(1)).min())  # the lowest shutter: 0 of a free pixel wraps around to 65,535
-    return lowest if lowest == highest - 1 else None
+    sole: int | None = 0  # without scribbles, the first shutter holds everywhere
+    if highest != scribbles.FREE:
+        lowest = int((labels - np.uint16(1)).min())  # the lowest shutter: 0 of a free pixel wraps around to 65,535
+        sole = lowest if lowest == highest - 1 else None
+    return LabelLayer(share=share, labels=labels, sole=sole, key=(share, labels.shape, digest))

@@ -1,10 +1,8 @@
-"""Running sums along time on a device: which sums a window holds, and which ones it makes when it moves. And the choice
-of the fastest window."""
+"""Running sums along time on a device: which sums a window holds, and which ones it makes when it moves."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from contextlib import suppress
 
 import numpy as np
 
@@ -14,35 +12,12 @@ from ..core.model import windows
 from ..core.model.frame_state import Light, Options
 from ..core.stopping import kept
 from ..devices import llvmpipe
-from ..devices.device import Device, Given, NoDeviceError, Texture
+from ..devices.device import Device, Given, Texture
 from ..devices.passes import Pass, read_pass
 from .layer_frames import WeightedFrames
-from .window import Frames, PackedFrames, Part, WholeFrames, Window, decoding, summable
+from .window import Part, Window, decoding
 
 _LISTED = 256  # tiles in a row of a list, as in shaders/accumulate.glsl
-
-
-def open_window(
-    device: Device, source: FrameSource, capacity: int, moved: bool, shutters: int, summed: bool = True
-) -> Window:
-    """Return the fastest window: running sums if the source allows them and the device has room, else frames.
-
-    Args:
-        device: the device
-        source: the footage
-        capacity: the most frames in the window
-        moved: exposures follow something, so each frame has to be whole
-        shutters: the shutters whose coefficients need room beside the window
-        summed: pictures are only made of sums of the frames
-    """
-    if moved:
-        return (PackedFrames if summable(source) else WholeFrames)(device, source, capacity, shutters)
-    with suppress(NoDeviceError):
-        if summed and isinstance(source, WeightedFrames) and source.is_summable:
-            return WeightedSums(device, source, capacity, shutters)
-        if summed and summable(source):
-            return Sums(device, source, capacity, shutters)
-    return Frames(device, source, capacity, shutters)
 
 
 # What running sums are stored as, by COVER of shaders/include/sums.glsl.

@@ -59,7 +59,7 @@ class Window:
         capacity: the most frames in a window
         layers: the layers of all texture arrays
         kind: their format
-        shutters: as for running_sums.open_window
+        shutters: as for GPUCompositor.window
         is_open: whether it has its textures; a released window cannot be used again
         sends: whether every picture sends all frames, because the device has no room for them
         cover: COVER of the shaders; 0: not of a layer

@@ -9,18 +9,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core.frames.frame_source import FrameSource, ShotFinder
+from ..core.frames.frame_source import FrameSource
 from ..core.model import windows
 from .request import Request
 
 # Pictures whose frames are decoded in advance, and how many frames or bytes of them lie decoded at most, besides those
 # on the device: enough for a long window, whose frames are decoded while its first picture is diffused and compiled.
 _AHEAD, _DECODED, _DECODED_BYTES = 4, 8, 256 << 20
-
-
-def shots_of(request: Request, source: FrameSource) -> ShotFinder | None:
-    """Return what finds the cuts at which the window ends; None: Options.stop_at_cuts is off, or there is none."""
-    return source.shots if request.state.options.stop_at_cuts else None
 
 
 def reach(request: Request, beside: int) -> tuple[int, int]:
@@ -40,8 +35,8 @@ def shot_of(request: Request, source: FrameSource, beside: int, *, known: bool =
         beside: see above
         known: read no frame to look for cuts; only cuts that were found before count
     """
-    index, (low, high), shots = request.index, reach(request, beside), shots_of(request, source)
-    if shots is None:
+    index, (low, high), shots = request.index, reach(request, beside), source.shots
+    if shots is None or not request.state.options.stop_at_cuts:
         return range(source.count)
     shot = shots.around(index, low, high, known=known)
     moved = windows.slid(request.state, index, request.direction, shot)
@@ -64,10 +59,9 @@ def slid(request: Request, shot: range) -> Request:
 
 def looked_for_cuts(request: Request, source: FrameSource, beside: int) -> tuple[set[int], set[int]]:
     """Return the source frames in which `shot_of` will look for cuts, and those in which it did, which wait."""
-    low, high = reach(request, beside)
-    if (shots := shots_of(request, source)) is None:
+    if source.shots is None or not request.state.options.stop_at_cuts:
         return set(), set()
-    return shots.lacking(request.index, low, high), shots.handed()
+    return source.shots.lacking(request.index, *reach(request, beside)), source.shots.handed()
 
 
 def positions(request: Request, shot: range) -> np.ndarray:

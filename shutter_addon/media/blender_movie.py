@@ -91,7 +91,9 @@ class BlenderMovie(FrameSource):
         return frame
 
     def close(self) -> None:
-        tell(self._known | {"wanted": "close"})
+        with _decoder.asking, suppress(MediaError):
+            if _decoder.process is not None:
+                _answer(self._known | {"wanted": "close"})
 
 
 def frame_rate(number: float) -> Fraction:
@@ -124,13 +126,6 @@ def ask(wanted: dict) -> tuple[dict, np.ndarray | None]:
             if (answer := _answer(wanted)) is not None:
                 return answer
     raise MediaError("the Blender that decodes it has ended")
-
-
-def tell(wanted: dict) -> None:
-    """Send a message to the process if it runs."""
-    with _decoder.asking, suppress(MediaError):
-        if _decoder.process is not None:
-            _answer(wanted)
 
 
 def _answer(wanted: dict) -> tuple[dict, np.ndarray | None] | None:

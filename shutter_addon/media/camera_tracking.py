@@ -147,12 +147,9 @@ class _Pursuit:
         points, off = part.astray(picture, motion.after(known.inverse()))
         if abs(frame - self._older[-1][1]) >= _SPAN and (anchor := self._anchor_at(frame, motion)):
             self._older.append(anchor)
-        columns, rows = (
-            np.floor(side / length * _CELLS)
-            for side, length in ((points.real, picture.shape[1]), (points.imag, picture.shape[0]))
-        )
-        cells = columns + _CELLS * rows
-        astray = [np.median(off[cells == cell]) > _OFF * picture.shape[0] for cell in np.unique(cells)]
+        height, width = picture.shape
+        cells = np.floor(points.real / width * _CELLS) + _CELLS * np.floor(points.imag / height * _CELLS)
+        astray = [np.median(off[cells == cell]) > _OFF * height for cell in np.unique(cells)]
         return float(np.clip((_MOST - np.mean(astray)) / (_MOST - _FEW), 0, 1)) if astray else 1.0
 
     def _compared(self, picture: np.ndarray, anchor: tuple[Part, int, Similarity]) -> Sighting:

@@ -13,6 +13,7 @@ from contextlib import closing, contextmanager, suppress
 from dataclasses import replace
 from functools import cache, cached_property
 from pathlib import Path
+from threading import Lock
 
 import numpy as np
 from OpenImageIO import ImageSpec
@@ -38,14 +39,15 @@ BLOCK = 20  # frames beyond a drawing that are carried together
 _PAUSE, _PATIENCE, _BEAT = 0.5, 20.0, 4.0
 
 
+Drawings = tuple[tuple[int, outlines.Curves], ...]  # source frames with the curves drawn there
+
+
 class CarriedMattes(SourceWrapper):
     """The mattes, a core.model.mattes.MatteSource; close it. Its frames are the source's filmed ones."""
 
     step = 1
 
-    def __init__(
-        self, source: FrameSource, drawings: tuple[tuple[int, outlines.Curves], ...], folder: Path | None = None
-    ) -> None:
+    def __init__(self, source: FrameSource, drawings: Drawings, folder: Path | None = None) -> None:
         """Read mattes that are carried from drawings; see subject_mattes.CarriedFile."""
         super().__init__(source)
         self._shots = source if isinstance(source, ShotSource) else ShotSource(source)
@@ -71,7 +73,7 @@ class CarriedMattes(SourceWrapper):
     def has(self, index: int) -> bool:
         """Whether a frame's matte is kept already; its file is not opened."""
         near = self._near(index)
-        return near == (None, None) or derived.is_kept(self._path(index, *near))
+        return near == (None, None) or derived.size_of(self._path(index, *near)) is not None
 
     def confidence(self, index: int) -> float | None:
         """How sure a frame's matte is (carrying.Carried); None: it is not kept yet."""
@@ -126,7 +128,7 @@ class CarriedMattes(SourceWrapper):
         with Claims(path.parent, _PATIENCE, _BEAT) as claims:
             try:
                 derived.own_folder(path.parent)
-                while not claims.take(name) and not derived.is_kept(path):
+                while not claims.take(name) and derived.size_of(path) is None:
                     stopping.check()
                     time.sleep(_PAUSE)
             except OSError as error:
@@ -199,7 +201,7 @@ class CarriedMattes(SourceWrapper):
         """The file of a frame's matte, made of these drawings."""
         key = derived.key({"version": VERSION, "frame": index, "drawn": self._drawn(first, last)})
         name = f"{index:08d}-{key}.png"
-        if self._parent and derived.is_kept(kept := self._parent / self._folder / name):
+        if self._parent and derived.size_of(kept := self._parent / self._folder / name) is not None:
             return kept
         return _writable(self._parent, self._folder) / name
 
@@ -227,7 +229,11 @@ def _writable(parent: Path | None, name: str) -> Path:
             if not (folder.is_symlink() and folder.is_dir()):  # derived.own_folder refuses a link
                 tempfile.TemporaryFile(dir=there).close()
             return folder
-    return Path(_temporary().name, name)
+    with _MAKING:
+        return Path(_temporary().name, name)
+
+
+_MAKING = Lock()  # or two threads would each make a folder
 
 
 @cache

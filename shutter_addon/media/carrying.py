@@ -107,7 +107,8 @@ def carried(frames: Frames, first: Drawing | None, last: Drawing | None, span: r
             _votes(footage.colors[frame], _at(footage.colors[end.frame], there), cover, box)
             for end, there, cover in zip(ends, places, covers, strict=True)
         ]
-        share = _mixed(sides, _weights(frame, ends))
+        passed = (frame - ends[0].frame) / (ends[1].frame - ends[0].frame) if len(ends) > 1 else 0.0
+        share = _mixed(sides, [1 - passed, passed][: len(ends)])
         matte = refined(frames(frame), share)
         if before is not None:
             still = stillness(footage.moved[frame], footage.colors[frame], footage.colors[frame - 1])
@@ -209,13 +210,6 @@ def _joined(
             there = forth[frame] if there is None else _at(there, forth[frame])
             places[last.frame, frame] = there
     return places
-
-
-def _weights(frame: int, ends: list[Drawing]) -> list[float]:
-    if len(ends) == 1:
-        return [1.0]
-    share = (frame - ends[0].frame) / (ends[1].frame - ends[0].frame)
-    return [1 - share, share]
 
 
 Box = tuple[slice, slice]  # rows and columns

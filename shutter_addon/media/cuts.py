@@ -100,22 +100,19 @@ def is_cut(before: list[Signature], after: list[Signature]) -> bool:
         return False
     passing = [(earlier, after[0]) for earlier in before[-PASSING - 1 : -1]]
     passing += [(before[-1], later) for later in after[1 : PASSING + 1]]
-    stands_out = all(may_be_cut(*pair) for pair in passing) and _stands_out(_moving(before[::-1]), _moving(after))
-    return stands_out and _all_changes(before[-1], after[0])
+    if not all(may_be_cut(*pair) for pair in passing) or not _stands_out(_moving(before[::-1]), _moving(after)):
+        return False
+    last, first = before[-1], after[0]
+    jumps = product(*(range(-(length // REACH), length // REACH + 1) for length in first.shape[:2]))
+    # Parts that are black do not count.
+    return all(_differ(*parts, 0.0, PART) for parts in zip(_parts(last), _parts(first), strict=True)) and all(
+        _unlike(_shared(last, y, x), _shared(first, -y, -x)) >= MOVED for y, x in jumps
+    )
 
 
 def may_be_cut(before: Signature, after: Signature) -> bool:
     """Return whether these two neighbors allow a cut between them."""
     return _differ(before, after, NOISE) and _unlike(before, after) >= APART
-
-
-def _all_changes(before: Signature, after: Signature) -> bool:
-    """Return whether brightness changes in every part that is not black, and the pictures have nothing in common for
-    any jump of the camera."""
-    jumps = product(*(range(-(length // REACH), length // REACH + 1) for length in before.shape[:2]))
-    return all(_differ(*parts, 0.0, PART) for parts in zip(_parts(before), _parts(after), strict=True)) and all(
-        _unlike(_shared(before, y, x), _shared(after, -y, -x)) >= MOVED for y, x in jumps
-    )
 
 
 def _parts(picture: Signature) -> list[Signature]:
@@ -175,16 +172,12 @@ def _whole(picture: np.ndarray) -> np.ndarray:
 
 def _hash(picture: np.ndarray) -> np.ndarray:
     """Return which of the lowest frequencies are above their median."""
-    small = _resized((_whole(picture) @ _GREY + (1 << 14)) >> 15, 2 * BITS)
+    grey = (_whole(picture) @ _GREY + (1 << 14)) >> 15
+    down, right = (_means(length, 2 * BITS) for length in grey.shape)
+    small = np.rint(down @ grey @ right.T)  # like OpenCV's INTER_AREA except for rounding
     waves = _waves(2 * BITS)[:BITS]
     low = np.float32(waves @ np.float32(small / max(small.max(), 1)) @ waves.T)
     return np.greater(low, np.median(low))
-
-
-def _resized(grey: np.ndarray, size: int) -> np.ndarray:
-    """Return a picture resized to a square by means, like OpenCV's INTER_AREA except for rounding."""
-    down, right = (_means(length, size) for length in grey.shape)
-    return np.rint(down @ grey @ right.T)
 
 
 @lru_cache(16)

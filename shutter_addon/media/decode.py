@@ -94,7 +94,7 @@ class FrameReader:
         while run.next is not None and _known(run).time < time and run.next.time <= time:
             run.advance()
         shown = _known(run)
-        if run.lost_between(time):
+        if any(shown.time < lost <= time for lost in run.lost):
             raise MediaError(run.fault)
         if time >= shown.time + max(shown.frame.duration, step) and run.cut_off():
             raise MediaError(run.fault or "the file is cut off")
@@ -200,13 +200,14 @@ class _Run:
         fault: the last error's message
         is_first: whether the file's first frame is shown
         passed: the latest time of a frame before it
+        lost: the times of frames that could not be decoded
     """
 
     def __init__(self, file: File, landmarks: _Landmarks, seeking: bool) -> None:
         self.file, self._landmarks = file, landmarks
         self.fault, self.is_first = "", not seeking
         self._awaited: list[int] = []
-        self._lost: list[int] = []
+        self.lost: list[int] = []
         self._end = self.passed = -math.inf
         self._ended = self._broken = False
         self._frames = self._decoded(seeking)
@@ -223,10 +224,6 @@ class _Run:
         self.shown, self.is_first = self.next, False
         self.next = next(self._frames, None)
 
-    def lost_between(self, time: float) -> bool:
-        """Return whether a frame after the shown one, up to a time, could not be decoded."""
-        return self.shown is not None and any(self.shown.time < lost <= time for lost in self._lost)
-
     def cut_off(self) -> bool:
         """Return whether the file ended before its declared end."""
         container = self.file.container
@@ -240,8 +237,7 @@ class _Run:
 
         Args:
             seeking: begin at the first key frame, without frames shown before it: in an open group they depend on
-            frames
-                that were not decoded
+                frames that were not decoded
         """
         floor: float | None = None if seeking else -math.inf
         misleading = self.file.container.format.name in MISLEADING
@@ -261,7 +257,7 @@ class _Run:
                 self._settle(time)
                 if frame.is_corrupt:
                     self.fault = DAMAGED
-                    self._lost.append(time)
+                    self.lost.append(time)
                 else:
                     yield _Timed(time, frame)
         self._settle(math.inf)
@@ -293,7 +289,7 @@ class _Run:
         while self._awaited and self._awaited[0] <= time:
             awaited = heapq.heappop(self._awaited)
             if awaited < time and self.fault:
-                self._lost.append(awaited)
+                self.lost.append(awaited)
 
 
 def _known(run: _Run) -> _Timed:

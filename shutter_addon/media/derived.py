@@ -82,12 +82,8 @@ def _hash(path: Path, size: int, _mtime: int, whole: int) -> bytes:
         return digest.digest()
 
 
-def is_kept(path: Path) -> bool:
-    """Whether a frame's file is there, which is not opened. A link is none."""
-    return _bytes(path) is not None
-
-
-def _bytes(path: Path) -> int | None:
+def size_of(path: Path) -> int | None:
+    """The bytes of a frame's file, which is not opened; None: it is not there. A link is none."""
     with suppress(OSError):
         status = path.lstat()
         return status.st_size if stat.S_ISREG(status.st_mode) else None
@@ -97,7 +93,7 @@ def _bytes(path: Path) -> int | None:
 def opened(path: Path, spec: ImageSpec) -> ImageInput | None:
     """A frame's opened file. None: it is not there, is damaged, or has not exactly the size and samples of `spec`, as
     a file that somebody else has put there may have millions of pixels."""
-    size = _bytes(path)
+    size = size_of(path)
     if size is None or size > 2 * spec.image_bytes() + _LARGER:
         return None
     image = ImageInput.open(check_name(path))

@@ -304,14 +304,10 @@ def _spread(values: np.ndarray, height: int, width: int) -> np.ndarray:
     """Values (h, w, C) of every STEPth pixel for all pixels, STEP² times as large: int32 (H, W, C)."""
     spread = values.astype(np.int32)
     for axis, length in ((0, height), (1, width)):
-        next_ = np.roll(spread, -1, axis=axis)
-        last = [slice(None)] * 3
-        last[axis] = slice(-1, None)
-        next_[tuple(last)] = spread[tuple(last)]
-        parts = [(STEP - k) * spread + k * next_ for k in range(STEP)]
-        shape = list(spread.shape)
-        shape[axis] *= STEP
-        spread = np.stack(parts, axis=axis + 1).reshape(shape).take(range(length), axis=axis)
+        before, share = np.divmod(np.arange(length, dtype=np.int32), STEP)
+        after = np.minimum(before + 1, spread.shape[axis] - 1)
+        share = share.reshape(-1, *[1] * (2 - axis))
+        spread = (STEP - share) * spread.take(before, axis) + share * spread.take(after, axis)
     return spread
 
 

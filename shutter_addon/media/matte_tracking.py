@@ -119,9 +119,8 @@ class _Pursuit:
         """
         there = registration.matrix(motion)
         size = second.shape[1], second.shape[0]
-        first, before = (
-            cv2.warpAffine(each, there, size) for each in (self._footage.picture(self._start), self._cover(self._start))
-        )
+        first = cv2.warpAffine(self._footage.picture(self._start), there, size)
+        before = cv2.warpAffine(self._cover(self._start), there, size)
         rest = moved(first, second, before, after, self._way)
         middle = complex(size[0] / 2, size[1] / 2)
         is_small = rest is not None and abs(rest.motion(middle) - middle) < _DRIFT * max(size) / 640

@@ -11,7 +11,6 @@ import numpy as np
 from ..core.model.mattes import Content, FileFrame, Matte, MatteFile, MatteSource
 from ..core.pixels.matte_grid import block_means, feathered, fitted
 from .carried_mattes import CarriedMattes
-from .cuts import ShotSource
 
 # The most files that stay open.
 MOST_OPEN = 16
@@ -39,11 +38,6 @@ class MatteValues:
     def another(self) -> MatteValues:
         """See MatteReader."""
         return MatteValues(*self._size, self._step, self._late)
-
-    @classmethod
-    def of(cls, source: ShotSource, late: Late | None = None) -> MatteValues:
-        """Return a reader for the pictures of a source."""
-        return cls(source.width, source.height, source.step, late)
 
     def values(self, mattes: tuple[Matte, ...], index: int, block: int) -> list[tuple[Hashable, np.ndarray]]:
         """See MatteReader. Raise EffectError or MediaError if a file cannot be read."""

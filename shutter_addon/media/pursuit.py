@@ -73,7 +73,8 @@ class PartPursuit:
             sighting = self._elsewhere(picture, missed) or sighting
         if sighting is None:
             if not missed:
-                self.reason = LEFT if self._leaves(picture) else COVERED
+                going_on = self._speed.after(self._speed).after(self._known)(self._first.points)
+                self.reason = LEFT if registration.inside(picture, going_on).mean() < 0.5 else COVERED
             self._missed += 1
             return None
         self._speed = sighting.motion.after(self._known.inverse()) if not missed else Similarity()
@@ -162,11 +163,6 @@ class PartPursuit:
                 if match and (sure := confidence(match, picture)) >= _AGAIN:
                     sightings.append(Sighting(match.motion.after(look.motion), look.worth * sure, match.held))
         return max(sightings, key=lambda each: each.confidence, default=None)
-
-    def _leaves(self, picture: np.ndarray) -> bool:
-        """Return whether most of the part would be outside the picture if it went on moving."""
-        places = self._speed.after(self._speed).after(self._known)(self._first.points)
-        return bool(registration.inside(picture, places).mean() < 0.5)
 
 
 @dataclass(frozen=True)

@@ -148,9 +148,8 @@ class Part:
         room = int(side + 2 * share * radius)
         around = Similarity(share, complex(room, room) / 2 - share * known(middle))
         look, weight = (cv2.warpAffine(each, matrix(alone), (side, side)) for each in (self._whole, self.weight))
-        place, inside = (
-            cv2.warpAffine(each, matrix(around), (room, room)) for each in (picture, np.ones(picture.shape, np.uint8))
-        )
+        place = cv2.warpAffine(picture, matrix(around), (room, room))
+        inside = cv2.warpAffine(np.ones(picture.shape, np.uint8), matrix(around), (room, room))
         scores = cv2.matchTemplate(place, look, cv2.TM_CCOEFF_NORMED, mask=weight)
         fits = cv2.erode(inside, np.ones((side, side), np.uint8), anchor=(0, 0), borderValue=0)
         fits = fits[: scores.shape[0], : scores.shape[1]].astype(bool) & np.isfinite(scores)

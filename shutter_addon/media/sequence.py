@@ -15,13 +15,8 @@ from ..core.messages import MediaError
 from .files import FOREIGN, check_file, check_index, check_name, check_size, stamp
 
 # The channels that every picture has, whatever their names in the file.
-CHANNELS = {
-    "luminance": slice(0, 3),
-    "red": slice(0, 1),
-    "green": slice(1, 2),
-    "blue": slice(2, 3),
-    "alpha": slice(3, 4),
-}
+CHANNELS = {"luminance": slice(0, 3)}
+CHANNELS |= {name: slice(k, k + 1) for k, name in enumerate(("red", "green", "blue", "alpha"))}
 # In Blender, these are scene linear, even logarithmic DPX. All other formats are sRGB, even float TIFF.
 LINEAR_SUFFIXES = frozenset({".exr", ".hdr", ".rgbe", ".dpx", ".cin"})
 OTHER_SUFFIXES = ".png .jpg .jpeg .jpe .tif .tiff .tga .bmp .webp .jp2 .j2k .j2c .psd .sgi .rgb .rgba .bw"
@@ -235,8 +230,7 @@ def by_number(path: Path, *, listed: bool = False) -> Callable[[int], Path] | No
     Args:
         path: the first file
         listed: the folder's files decide which number counts (MediaError: it cannot be listed); else it is the last
-        one,
-            as in Blender's movie clips
+            one, as in Blender's movie clips
     """
     parts = _frame_number(path)[0] if listed else next(iter(_numbers(path.stem)), None)
     if parts is None:

@@ -2,12 +2,16 @@
 
 Whatever a pair of frames needs is found when its first moment is read, which the thread that decodes ahead does
 (prefetch). No moment is kept on disk, but vectors may be (derived.StoredVectors).
+
+And how far what footage shows moves from frame to frame: whether an exposure over several of them streaks, or shows
+copies of what moves side by side.
 """
 
 from __future__ import annotations
 
 import math
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,7 +21,7 @@ from ..core.memo import Kept
 from ..core.messages import MediaError
 from ..core.model.motions import Similarity
 from ..core.model.shutters import MAX_WINDOW
-from . import flow, opencv, steps
+from . import flow, opencv
 from .cuts import may_be_cut
 from .derived import StoredVectors
 from .files import check_index
@@ -31,6 +35,14 @@ REPEATED, TIMES = 3.0, 3.0
 _ROWS, _PATCH = 68, 3  # of the pictures that are compared; across and down, as grain goes in a mean
 _PICTURES, _CHANGES = 4, 1024  # that are kept
 
+_MEASURED = 270  # rows of the pictures in which motion is measured
+# The share of the picture that moves at least so far, of all whose motion is known: what is smaller is not looked at.
+_SHARE = 0.01
+_THERE_AND_BACK = 0.2, 0.5  # of a vector, and pixels beside that, by which the way back may miss where it started
+# Copies that lie so far apart, in heights of the picture, look like a streak: 3 pixels of 1080; at 4, lines show in
+# sharp lettering. Edges of footage are some 2 pixels wide, however small it is.
+_SMOOTH, _SMOOTH_PIXELS = 3 / 1080, 2.0
+_KNOWN = 0.25  # of the picture whose motion has to be known: across a cut, that of little is
 _PAIRS = 8  # of neighbouring frames, spread over the footage, that "auto" looks at
 _FRAMES = MOST + 2  # frames that are kept: those that say what repeats
 
@@ -127,11 +139,12 @@ class SmoothSource(SourceWrapper):
     def _moment(self, pair: tuple[int, int], number: int) -> Decoded:
         """What is so many moments after the first of two frames."""
         steps = (pair[1] - pair[0]) * self.step
-        return self._pairs.ask(pair, lambda: self._between(pair), 2).moment(pair, number, steps)
 
-    def _between(self, pair: tuple[int, int]) -> flow.Between:
-        first, second = map(self._source.read, pair)
-        return flow.Between(first, second, self.transfer, self.alpha, self._find)
+        def between() -> flow.Between:
+            first, second = map(self._source.read, pair)
+            return flow.Between(first, second, self.transfer, self.alpha, self._find)
+
+        return self._pairs.ask(pair, between, 2).moment(pair, number, steps)
 
     def close(self) -> None:
         """Closes the file, and lets go of all frames."""
@@ -156,7 +169,7 @@ def steps_for(source: FrameSource, smooth: int | str, window: int, *, skip_repea
         return min(int(smooth), most)
     if opencv.cv2 is None or source.count < 2:
         return 1
-    needed = _fastest(source, skip_repeats) / steps.smooth(source.height)
+    needed = _fastest(source, skip_repeats) / smooth_step(source.height)
     return next((count for count in SMOOTH if needed <= count <= most), most)
 
 
@@ -165,13 +178,55 @@ def _fastest(source: FrameSource, skip_repeats: bool) -> float:
     filmed = SourceWrapper(source, lru_cache(_FRAMES)(source.read))
     repeats = Repeats(filmed) if skip_repeats else None
     pairs = sorted({(source.count - 2) * k // (_PAIRS - 1) for k in range(_PAIRS)})
-    moved = []
+    found = []
     for pair in pairs:
         try:
             first, last = repeats.gap(pair) if repeats else (pair, pair + 1)
-            found = steps.moved(filmed, first, last)
+            ways = moved(filmed, first, last)
         except MediaError:  # who needs these frames is told
             continue
-        if found is not None:
-            moved.append(steps.step(found, Similarity(), Similarity()) * source.height / (last - first))
-    return max(moved, default=0.0)
+        if ways is not None:
+            found.append(step(ways, Similarity(), Similarity()) * source.height / (last - first))
+    return max(found, default=0.0)
+
+
+class Moved(NamedTuple):
+    """Where places of a frame, (n,) complex, lie in the next one: x + iy in fractions of the height, y down."""
+
+    before: np.ndarray
+    after: np.ndarray
+
+
+def moved(source: FrameSource, index: int, other: int | None = None) -> Moved | None:
+    """What moves from a frame to another, or else to the next one; None: that cannot be told, as across a cut. It reads
+    both. It takes OpenCV. MediaError: they cannot be read."""
+    first, second = (flow.of_rows(source.read(i), source, _MEASURED) for i in (index, other or index + 1))
+    if min(first.shape) < flow.SMALLEST:
+        return None
+    forth, back = flow.vectors(first, second), flow.vectors(second, first)
+    rows, columns = np.mgrid[: first.shape[0], : first.shape[1]]
+    places = columns + 1j * rows
+    forth, back = (vectors[..., 0] + 1j * vectors[..., 1] for vectors in (forth, back))
+    ends = places + forth
+    x, y = np.rint(ends.real).astype(int), np.rint(ends.imag).astype(int)
+    inside = (x >= 0) & (x < first.shape[1]) & (y >= 0) & (y < first.shape[0])
+    returned = np.abs(forth + back[np.where(inside, y, 0), np.where(inside, x, 0)])
+    known = inside & (returned <= _THERE_AND_BACK[0] * np.abs(forth) + _THERE_AND_BACK[1])
+    if known.mean() < _KNOWN:
+        return None
+    known[:, ::2] = known[::2] = False  # a quarter of them is enough
+    return Moved(*(points[known].astype(np.complex64) / first.shape[0] for points in (places, ends)))
+
+
+def step(moved: Moved, before: Similarity, after: Similarity) -> float:
+    """How far, in heights of the picture, what moves most goes in an exposure that follows something: _SHARE of the
+    picture goes as far or farther.
+
+    before, after: where the points of the shown picture lie in the two frames, in heights of the picture"""
+    ways = after.inverse()(moved.after) - before.inverse()(moved.before)
+    return float(np.quantile(np.abs(ways), 1 - _SHARE))
+
+
+def smooth_step(height: int) -> float:
+    """Up to how many pixels from frame to frame a streak looks smooth, in a picture of that height."""
+    return max(_SMOOTH * height, _SMOOTH_PIXELS)

@@ -38,8 +38,6 @@ UNSURE, UNLIKE, SMALL, RISES = (0.85, 0.95), (0.5, 0.8), 3000, 0.05
 REST = 1.25  # how much more a pixel may differ from its place before than from where flow leads, to count as at rest
 _INPUT = re.compile(r"// <Input> CV_32FC1 \[1 x 3 x (\d+) x (\d+)\]")  # of OpenCV's description
 
-Box = tuple[slice, slice]  # rows and columns
-
 
 @dataclass(frozen=True)
 class Found:
@@ -88,7 +86,10 @@ class Network:
             MediaError: The network is of another kind.
         """
         stopping.check()
-        size = self._size(picture, share)
+        height, width = picture.shape[:2]
+        # As wide or high as the picture is.
+        sides = zip((width, height), (self._width, self._height), strict=True)
+        size = [max(round(share * own * side / max(height, width) / MULTIPLE), LEAST) * MULTIPLE for side, own in sides]
         small = cv2.resize(picture, size, interpolation=cv2.INTER_AREA).astype(np.float32)
         values = (small / max(float(small.max()), 1.0) - np.array(MEAN, np.float32)) / np.array(DEVIATION, np.float32)
         try:
@@ -102,15 +103,7 @@ class Network:
         mask = (mask - mask.min()) / max(float(np.ptp(mask)), 1e-6)
         return np.clip(cv2.resize(mask, picture.shape[1::-1], interpolation=cv2.INTER_LINEAR), 0, 1)
 
-    def _size(self, picture: np.ndarray, share: float) -> tuple[int, int]:
-        """Return the width and height of what the network looks at, as wide or high as the picture is."""
-        height, width = picture.shape[:2]
-        longest = max(height, width)
-        sides = zip((width, height), (self._width, self._height), strict=True)
-        w, h = (max(round(share * own * side / longest / MULTIPLE), LEAST) * MULTIPLE for side, own in sides)
-        return w, h
-
-    def within(self, picture: np.ndarray, box: Box, share: float = 1.0) -> np.ndarray:
+    def within(self, picture: np.ndarray, box: carrying.Box, share: float = 1.0) -> np.ndarray:
         """Return its answer on a part of a picture; nothing elsewhere."""
         found = np.zeros(picture.shape[:2], np.float32)
         found[box] = self.answer(np.ascontiguousarray(picture[box]), share)
@@ -156,7 +149,7 @@ def found(network: Network, picture: np.ndarray, on: np.ndarray, off: np.ndarray
     return without(Found(share, np.zeros_like(share), _confidence(share, sure)), picture, on, off)
 
 
-def _sure(share: np.ndarray, on: np.ndarray, box: Box) -> float:
+def _sure(share: np.ndarray, on: np.ndarray, box: carrying.Box) -> float:
     """Return how sure the network is of a part, 0 to 1; 0 if no subject is under strokes, less if the box cuts it."""
     inside = share > INSIDE
     if inside[on].mean() < TOUCHED or inside.mean() > LARGEST:
@@ -253,7 +246,7 @@ def followed(network: Network, before: np.ndarray, picture: np.ndarray, subject:
     return Found(share, excluded, confidence), still
 
 
-def around(where: np.ndarray, room: float) -> Box:
+def around(where: np.ndarray, room: float) -> carrying.Box:
     """Return the box around an area (h, w), with room on each side: a share of its longest one."""
     area = where.astype(np.float32)
     tight = carrying.box_around(area, reach=0)

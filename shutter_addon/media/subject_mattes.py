@@ -20,7 +20,7 @@ from ..core import stopping
 from ..core.frames.frame_source import FrameSource
 from ..core.model import outlines
 from . import carrying, derived, flow, opencv
-from .carried_mattes import CONFIDENCE, CarriedMattes, nearest
+from .carried_mattes import CONFIDENCE, CarriedMattes, Drawings, nearest
 from .image_writing import write_levels
 from .opencv import cv2
 from .subject import MODEL, WIDTH, Found, Network, covered, followed, found, refined, without
@@ -71,7 +71,7 @@ class CarriedFile:
 
     footage: Footage
     # Each frame of a window asks for the hash; drawings may have thousands of points.
-    drawings: tuple[tuple[int, outlines.Curves], ...] = field(hash=False)
+    drawings: Drawings = field(hash=False)
     folder: Path | None = None
     subject: Subject | None = None
     model: Path = MODEL
@@ -88,12 +88,7 @@ class SubjectMattes(CarriedMattes):
     """The mattes of a subject; see CarriedMattes."""
 
     def __init__(
-        self,
-        source: FrameSource,
-        drawings: tuple[tuple[int, outlines.Curves], ...],
-        folder: Path | None,
-        subject: Subject,
-        model: Path,
+        self, source: FrameSource, drawings: Drawings, folder: Path | None, subject: Subject, model: Path
     ) -> None:
         super().__init__(source, drawings, folder)
         self._subject, self._model, self._digest = subject, model, derived.content_digest(model, whole=1 << 40).hex()

@@ -94,8 +94,7 @@ class Track(ABC):
             frames: all frames that may be tracked, with `start`
             motion: what changes: "location", also "rotation", or also "scale"
             anchors: frames with correct placements. Tracking ends at the nearest one on each side. Frames in between
-            are
-                then yielded again, blended with tracking back from the anchor.
+                are then yielded again, blended with tracking back from the anchor.
 
         Raises:
             TrackingError: at once, if nothing can be tracked

@@ -11,7 +11,7 @@ from support import image_strip, picture_of, request, write_frames
 from shutter_addon.blender.data import consistency, fcurves, selection, snapshot
 from shutter_addon.blender.editing import add_effect, bar_edits, shutter_edits
 from shutter_addon.blender.rendering import strobing
-from shutter_addon.media import steps
+from shutter_addon.media import smooth
 
 WIDTH, HEIGHT, COUNT = 320, 180, 12  # at this height, 2 pixels look smooth
 
@@ -116,8 +116,8 @@ def test_frames_that_repeat_are_told(add):
 
 def test_drawing_never_waits_and_measures_once(add, monkeypatch):
     edit, effect, strip = add(12, np.ones(4))
-    measured, moved = [], steps.moved
-    monkeypatch.setattr(steps, "moved", lambda *given: measured.append(given[1]) or moved(*given))
+    measured, moved = [], smooth.moved
+    monkeypatch.setattr(smooth, "moved", lambda *given: measured.append(given[1]) or moved(*given))
     taken = snapshot.take(edit, effect, strip, (4,))
     assert strobing.look(effect, taken, *asked(edit, effect, strip, 4))[0] is None
     assert not measured

@@ -143,7 +143,7 @@ def check_mixed(case: Case, devices: dict, folder: Path) -> dict:
 
         @contextmanager
         def rendering(compositor):
-            renderer = Renderer(compositor, source, MatteValues.of(source))
+            renderer = Renderer(compositor, source, MatteValues(source.width, source.height, source.step))
             try:
                 yield renderer
             finally:

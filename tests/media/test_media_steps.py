@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from shutter_addon.core.model.motions import Similarity
-from shutter_addon.media import steps
+from shutter_addon.media import smooth
 
 STILL = Similarity()
 
@@ -36,21 +36,21 @@ def shift(x, y=0.0):
 @pytest.mark.parametrize(("x", "y"), [(0, 0), (0.5, 0), (1, 1), (3, 0), (0, -8), (20, 10), (40, 0)])
 def test_a_shift_is_found(x, y):
     film = Film(shift(x, y))
-    found = steps.step(steps.moved(film, 1), STILL, STILL) * 540
+    found = smooth.step(smooth.moved(film, 1), STILL, STILL) * 540
     assert found == pytest.approx(np.hypot(x, y), abs=0.1 + 0.03 * np.hypot(x, y))
 
 
 @pytest.mark.parametrize("size", [(1920, 1080), (480, 270), (320, 180)])
 def test_the_pictures_size_does_not_matter(size):
     share = 0.01
-    found = steps.step(steps.moved(Film(shift(share * size[1]), size), 1), STILL, STILL)
+    found = smooth.step(smooth.moved(Film(shift(share * size[1]), size), 1), STILL, STILL)
     assert found == pytest.approx(share, rel=0.1)
 
 
 @pytest.mark.parametrize(("side", "is_seen"), [(30, False), (120, True)])
 def test_a_subject_counts_if_it_is_large_enough(side, is_seen):
     film = Film(shift(0), subject=lambda k: (300 + 10 * k, side))
-    found = steps.step(steps.moved(film, 1), STILL, STILL) * 540
+    found = smooth.step(smooth.moved(film, 1), STILL, STILL) * 540
     assert found == pytest.approx(10 if is_seen else 0, abs=0.5)
 
 
@@ -58,9 +58,9 @@ def test_what_is_followed_stands_still_and_the_rest_moves():
     """A panning shot: of a subject that moves by 10 pixels before what stands still."""
     film = Film(shift(0), subject=lambda k: (300 + 10 * k, 150))
     ways = Similarity(1, 10 / 540), Similarity(1, 20 / 540)
-    assert steps.step(steps.moved(film, 1), *ways) * 540 == pytest.approx(10, abs=0.5)
+    assert smooth.step(smooth.moved(film, 1), *ways) * 540 == pytest.approx(10, abs=0.5)
     whole = Film(shift(10))
-    assert steps.step(steps.moved(whole, 1), *ways) * 540 == pytest.approx(0, abs=0.2)
+    assert smooth.step(smooth.moved(whole, 1), *ways) * 540 == pytest.approx(0, abs=0.2)
 
 
 def test_a_turn_is_followed():
@@ -71,10 +71,10 @@ def test_a_turn_is_followed():
         c, s = np.cos(k * angle), np.sin(k * angle)
         return [[c, -s, -160 * c + 160 * s], [s, c, -160 * s - 160 * c]]
 
-    found = steps.moved(Film(turned), 1)
-    assert steps.step(found, STILL, STILL) * 540 > 7
+    found = smooth.moved(Film(turned), 1)
+    assert smooth.step(found, STILL, STILL) * 540 > 7
     ways = (Similarity(complex(np.exp(1j * k * angle)), 0) for k in (1, 2))
-    assert steps.step(found, *ways) * 540 < 0.5
+    assert smooth.step(found, *ways) * 540 < 0.5
 
 
 def test_nothing_is_told_across_a_cut():
@@ -83,15 +83,15 @@ def test_nothing_is_told_across_a_cut():
     first, second = film.read(0), np.flip(film.read(0), (0, 1)).copy()
     second[..., :3] = rng.integers(0, 256, second[..., :3].shape, dtype=np.uint8)
     film.read = lambda index: (first, second)[index]
-    assert steps.moved(film, 0) is None
+    assert smooth.moved(film, 0) is None
 
 
 def test_a_picture_of_few_pixels_tells_nothing():
     film = Film(shift(1), size=(20, 8))
-    assert steps.moved(film, 0) is None
+    assert smooth.moved(film, 0) is None
 
 
 @pytest.mark.parametrize(("height", "most"), [(90, 2), (720, 2), (1080, 3), (2160, 6)])
 def test_a_streak_is_smooth_whose_copies_are_near(height, most):
     """Three pixels of 1080, but two of any picture: edges are as wide."""
-    assert steps.smooth(height) == pytest.approx(most)
+    assert smooth.smooth_step(height) == pytest.approx(most)

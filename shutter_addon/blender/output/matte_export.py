@@ -117,7 +117,7 @@ def _write(shown: EffectStrip, region: PropertyGroup, folder: Path, first: int, 
     with (
         atomic_write.part_folder(folder) as part,
         closing(effect_source.open_source(taken)) as source,
-        closing(MatteValues.of(source)) as values,
+        closing(MatteValues(source.width, source.height, source.step)) as values,
     ):
         clip = effect_source.clip_of(taken, source)
         for number, frame in enumerate(frames, first):

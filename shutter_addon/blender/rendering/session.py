@@ -219,7 +219,8 @@ class RenderSession:
             if known is not None:
                 self._submit(known[1].close)
             source = key.open(planes=compositor.takes_planes, keeps=self._late is None)
-            known = key, Renderer(compositor, source, MatteValues.of(source, self._late))
+            mattes = MatteValues(source.width, source.height, source.step, self._late)
+            known = key, Renderer(compositor, source, mattes)
         self._renderers[key.place] = known
         while len({scene for scene, _ in list(self._renderers)}) > _KEPT:
             self._submit(self._renderers.pop(next(iter(self._renderers)))[1].close)

@@ -21,7 +21,7 @@ from ...core.memo import Kept
 from ...core.model import windows
 from ...core.model.frame_state import FrameState
 from ...core.model.motions import Similarity
-from ...media import MediaError, opencv, steps
+from ...media import MediaError, opencv, smooth
 from ..data.snapshot import Snapshot
 from ..data.source_media import SourceSpec
 
@@ -42,7 +42,7 @@ class _Measuring:
         job: What is measured now.
     """
 
-    moved: Kept[tuple, steps.Moved | None] = field(default_factory=Kept)
+    moved: Kept[tuple, smooth.Moved | None] = field(default_factory=Kept)
     looks: dict[int, tuple[float | None, float | None, bool]] = field(default_factory=dict)
     wanted: tuple[SourceSpec, int] | None = None
     job: Future | None = None
@@ -86,8 +86,8 @@ def _step(effect: PropertyGroup, snapshot: Snapshot, renderer: Renderer, request
         if (moved := _measuring.moved[key]) is not None:
             height, state = effect.scene.render.resolution_y, request.state
             shutters = [shutter for shutter, pairs in exposed.items() if pair in pairs]
-            step = height * max(steps.step(moved, *_ways(state, i, pair, renderer.source.height)) for i in shutters)
-            return step if step > steps.smooth(height) else None
+            step = height * max(smooth.step(moved, *_ways(state, i, pair, renderer.source.height)) for i in shutters)
+            return step if step > smooth.smooth_step(height) else None
     return None
 
 
@@ -159,4 +159,4 @@ def _measure_motion(spec: SourceSpec, pair: int) -> None:
     _measuring.moved.keep((spec.key, pair), None, _KEPT)  # an unreadable pair is not tried again
     if opencv.cv2 is not None:
         with suppress(MediaError, OSError), spec.open() as medium:
-            _measuring.moved.keep((spec.key, pair), steps.moved(medium, pair), _KEPT)
+            _measuring.moved.keep((spec.key, pair), smooth.moved(medium, pair), _KEPT)
