@@ -97,7 +97,7 @@ def _tiles(source: FrameSource) -> Iterator[Tile]:
 
 
 class CPUCompositor:
-    """gpu.GPUCompositor and stages.Stages with NumPy."""
+    """request.Compositor and request.Stages with NumPy."""
 
     name = "NumPy"
     takes_planes = False

@@ -7,7 +7,7 @@ pixels that are too near to the end of a level. For those, about one in a hundre
 
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
@@ -162,14 +162,7 @@ def _curve(display: Display) -> np.ndarray:
 
 
 class GPUCompositor:
-    """Composes pictures on a Device.
-
-    Attributes:
-        name: the device's name
-        takes_planes: whether frames are fastest to send as planes (core.frames.planes)
-        current: returns a context manager in which all other methods are called (Device.current)
-        freeing: returns a context manager in which windows and stages are released (Device.freeing)
-    """
+    """request.Compositor on a Device."""
 
     def __init__(self, device: Device) -> None:
         self.device, self.name, self.takes_planes = device, device.name, device.takes_planes
@@ -180,15 +173,7 @@ class GPUCompositor:
     def window(
         self, source: FrameSource, capacity: int, moved: bool = False, shutters: int = 4, summed: bool = True
     ) -> Window:
-        """Return the fastest window: running sums if the source allows them and the device has room, else frames.
-
-        Args:
-            source: the footage
-            capacity: the most frames in the window
-            moved: exposures follow something, so each frame has to be whole
-            shutters: the shutters whose coefficients need room beside the window
-            summed: pictures are only made of sums of the frames
-        """
+        """See request.Compositor: running sums if the source allows them and the device has room."""
         size = self.device, source, capacity, shutters
         if moved:
             return PackedFrames(*size) if summable(source) else WholeFrames(*size)
@@ -203,28 +188,25 @@ class GPUCompositor:
         return Stages(self.device)
 
     def labels(self, values: np.ndarray) -> Texture:
-        """Return labels (H, W) uint16 on the device: a texture r32ui, valid until the next call."""
+        """See request.Compositor."""
         return self._textures.filled("labels", [values.astype(np.uint32)], "r32ui")
 
     def coefficients(self, handle: Texture, count: int) -> np.ndarray:
-        """Return coefficients (N, h, w) float32 of `count` shutters as an array."""
         values = self.device.read(handle)
         return np.moveaxis(values, -1, 1).reshape(-1, *values.shape[1:3])[:count]
 
     def read(self, drawn: Texture) -> np.ndarray:
-        """Return a drawn picture as an array (H, W, 4), top row first: float32, or levels in uint8."""
         picture = self.device.read(drawn)[0]
         return picture if drawn.kind == "rgba8" else picture[::-1]
 
     def over_black(self, drawn: Texture) -> np.ndarray:
-        """Return the levels over black of a drawn scene-linear picture (Renderer.picture)."""
         size = drawn.size[:2]
         texture = self._textures.of("levels", (*size, 1), "rgba8")
         self.device.run(LEVELS, size, images={"picture": drawn, "levels": texture}, size=size)
         return self.device.read(texture)[0]
 
     def shown(self, drawn: Texture, display: Display) -> np.ndarray:
-        """Return the display's levels (H, W, 4) uint8 of a drawn, opaque, scene-linear picture, top row first."""
+        """See request.Compositor."""
         width, height, _ = drawn.size
         noise, levels = display.noise(width, height), self._textures.of("levels", (width, height, 1), "rgba8")
         images = {"picture": drawn, "levels": levels}
@@ -387,6 +369,3 @@ class GPUCompositor:
         with self.device.freeing():
             self._textures.release()
         self.device.release()
-
-
-Compositor: TypeAlias = GPUCompositor | cpu.CPUCompositor

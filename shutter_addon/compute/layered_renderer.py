@@ -12,12 +12,9 @@ from ..core.model.frame_state import FrameState, Layers
 from ..core.model.mattes import MatteReader
 from ..core.pixels import layering
 from . import plates, window_frames
-from .cpu import CPUCompositor
-from .gpu import Compositor
 from .guide import Guides, NotedSource
 from .layer_frames import LayerMattes, RecentFrames, WeightedFrames
-from .request import Behind, Coefficients, Exposure, Handle, Request
-from .stages import Stages
+from .request import Behind, Coefficients, Compositor, Exposure, Handle, Request, Stages
 from .window import summable
 
 # The parts of a picture: {(layer, −1 for what lies behind; whether only weights are composed): request}.
@@ -41,7 +38,7 @@ class LayeredRenderer:
     def __init__(
         self,
         compositor: Compositor,
-        stages: Stages | CPUCompositor,
+        stages: Stages,
         source: FrameSource,
         guides: Guides,
         mattes: MatteReader | None,

@@ -17,9 +17,9 @@ from ..core.model.mattes import MatteReader
 from ..devices.device import Budget, NoDeviceError
 from . import guide, window_frames
 from .cpu import CPUCompositor
-from .gpu import Compositor, GPUCompositor
+from .gpu import GPUCompositor
 from .layered_renderer import LayeredRenderer
-from .request import Coefficients, Handle, Request
+from .request import Coefficients, Compositor, Handle, Request
 
 if TYPE_CHECKING:
     from ..devices.gl import GLDevice

@@ -22,7 +22,7 @@ LEAST = read_pass("layer", "LEAST")
 
 
 class Stages:
-    """A renderer's stages on a Device. Results are valid until a method's next call."""
+    """request.Stages on a Device."""
 
     def __init__(self, device: Device) -> None:
         self._device = device
@@ -32,14 +32,7 @@ class Stages:
         self._held: dict[int, Hashable] = {}  # {layer of _mattes: key of the values in it}
 
     def solve(self, labels: np.ndarray, count: int, *guided: Any, warm: bool = False) -> Texture:
-        """Return coefficients, as compute.diffusion.diffuse does. The memory of the other kind of diffusion is freed.
-
-        Args:
-            labels: (h, w)
-            count: the number of shutters
-            guided: its guide and strength, or nothing
-            warm: whether it may start from the last coefficients
-        """
+        """See request.Stages. The memory of the other kind of diffusion is freed."""
         if guided and 0 < np.count_nonzero(labels) < labels.size:  # else nothing is diffused
             self._plain.release()
             return self._edged.solve(labels, count, *guided)
@@ -47,13 +40,13 @@ class Stages:
         return self._plain.solve(labels, count, warm=warm)
 
     def upload(self, values: np.ndarray) -> Texture:
-        """Return coefficients (N, h, w), or (N, 1, 1) for the whole picture, on the device."""
+        """See request.Stages."""
         name = "constant" if values.shape[1:] == (1, 1) else "uploaded"
         fours = np.moveaxis(padded(np.moveaxis(values, 0, -1)), 2, 0)  # layers (⌈N/4⌉, h, w, 4)
         return self._textures.filled(name, fours.astype(np.float32))
 
     def add(self, mixed: Texture | None, added: Texture, share: float, size: tuple[int, int]) -> Texture:
-        """Return a sum (h, w) of coefficients plus a share of others. mixed: the last sum. None: start one."""
+        """See request.Stages."""
         height, width = size
         result = self._textures.of("sum", (width, height, added.size[2]), "rgba32f")
         whole = self._textures.filled("share", [np.full((1, 1, 1), share, np.float32)], "r32f")
@@ -66,15 +59,7 @@ class Stages:
     def blend(
         self, beneath: Texture, mattes: tuple[Matte, ...], layers: Sequence[tuple[Hashable, np.ndarray]]
     ) -> Texture:
-        """Return coefficients with mattes laid over them (core.model.mattes.blended).
-
-        The last values stay on the device.
-
-        Args:
-            beneath: the coefficients
-            mattes: the mattes
-            layers: a key and the values (h, w) float32 of each matte
-        """
+        """See request.Stages. The last values stay on the device."""
         height, width = layers[0][1].shape
         values = self._textures.of("mattes", (width, height, min(len(mattes), MOST_MATTES)), "r32f")
         if values is not self._mattes:
@@ -102,7 +87,7 @@ class Stages:
         return beneath
 
     def least_share(self, exposed: Exposure) -> float:
-        """Return the lowest share of any pixel. The device finds that of each block."""
+        """See request.Stages. The device finds the lowest share of each block."""
         width, height, _ = exposed.share.size
         least = self._textures.of("least", (-(-width // BLOCK), -(-height // BLOCK), 1), "r32f")
         images = {"clear": exposed.share, "least": least}
@@ -110,7 +95,7 @@ class Stages:
         return self._device.read(least).min()
 
     def lay(self, behind: Behind, layers: Sequence[Exposure], levels: bool) -> Texture:
-        """Return the picture of layers laid over one another (core.pixels.layering)."""
+        """See request.Stages."""
         under, plate = behind.exposed.color, None
         size = width, height = under.size[:2]
         if behind.plate is not None:

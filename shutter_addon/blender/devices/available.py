@@ -10,8 +10,9 @@ import gpu
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...compute.cpu import CPUCompositor
-from ...compute.gpu import Compositor, GPUCompositor
+from ...compute.gpu import GPUCompositor
 from ...compute.renderer import open_gl
+from ...compute.request import Compositor
 from ...core import threads
 from ...devices.device import NoDeviceError
 from .blender_gpu import BlenderDevice, opens_in_background
