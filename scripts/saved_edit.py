@@ -187,7 +187,7 @@ def _bake(scene: Any, strip: Any) -> None:
     strip.left_handle += 1
     film = baked_film.film_of(scene, effect, strip, "OPEN_EXR")
     baked_film.render(scene, effect, strip, film, lambda _count: None)
-    baked_strips.lay(scene, strip, film)
+    baked_strips.add_strip(scene, strip, film)
 
 
 def _add_other_regions(scene: Any, effect: Any, footage: Path) -> None:

@@ -56,7 +56,7 @@ def above(path, folder):
 
 # The rooms of core/ and blender/, and what of their layer each may use. Beside those of core lies what all rooms use,
 # beside those of blender command.py and the handlers, which use all rooms.
-BASICS = {"atomic_write", "memo", "messages", "revision", "scanlines", "stopping", "threads", "told"}
+BASICS = {"atomic_write", "caches", "messages", "recent_errors", "revision", "scanlines", "stopping", "threads"}
 ROOMS = {
     "core": {
         "frames": BASICS,

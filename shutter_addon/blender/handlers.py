@@ -12,7 +12,7 @@ import bpy
 from bpy.app.handlers import persistent
 from bpy.types import Depsgraph, Scene
 
-from ..core import revision, told
+from ..core import recent_errors, revision
 from ..core.messages import sentence
 from .data import data_format, preview_areas, source_media, strips, versions
 from .devices import main_thread
@@ -103,7 +103,7 @@ def _before_render(scene: Scene, *_) -> None:
         return
     is_film = render_job.begin(scene)
     if scene.render.engine == strips.ENGINE and render_job.where() is not Where.JOB:
-        invalidation.drop_spoilt()
+        invalidation.drop_failed()
     if is_film and scene.render.engine != strips.ENGINE:
         film = scene.session_uid
         if not render_job.on_main_thread(partial(_prepare, film, render_job.where() is Where.JOB)):
@@ -114,9 +114,9 @@ def _before_render(scene: Scene, *_) -> None:
 def _prepare(film: int, in_job: bool) -> bool:
     """Prepare a film's render on the main thread, whatever thread renders. Return True when done."""
     revision.changed()  # a script may have changed something without an update
-    sessions.settle()
-    invalidation.drop_spoilt()
-    invalidation.drop_lesser()
+    sessions.close_if_device_changed()
+    invalidation.drop_failed()
+    invalidation.drop_reduced()
     source_media.look_again()
     if not data_format.is_file_newer():
         # In a window the last update has done that, except for views, which no handler reports.
@@ -141,7 +141,7 @@ def _before_frame(scene: Scene, *_) -> None:
 def _after_render(scene: Scene, *_) -> None:
     if not render_job.is_film(scene):
         return  # a render of an effect, for a film or a preview
-    render_job.soon(invalidation.drop_spoilt)
+    render_job.soon(invalidation.drop_failed)
     edit_feed.end()
     job_snapshots.end()
     render_job.end(scene, alone=not render_job.script_waits(inspect.currentframe()))
@@ -157,7 +157,7 @@ def _uncaught(
     Args:
         before: the hook before this one, which prints them.
     """
-    told.exception(error)
+    recent_errors.exception(error)
     before(kind, error, trace)
 
 

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from ..core.caches import LastValue
 from ..core.frames.frame_source import FrameSource
-from ..core.memo import Memo
 from ..core.model import windows
 from ..core.model.frame_state import AVERAGE, Combine, Following, FrameState
 from ..core.pixels.shown_levels import Display
@@ -168,7 +168,7 @@ class GPUCompositor:
         self.device, self.name, self.takes_planes = device, device.name, device.takes_planes
         self.current, self.freeing = device.current, device.freeing
         self._textures = NamedTextures(device)
-        self._displayed: Memo[tuple[dict[str, Texture], float]] = Memo()
+        self._displayed: LastValue[tuple[dict[str, Texture], float]] = LastValue()
 
     def window(
         self, source: FrameSource, capacity: int, moved: bool = False, shutters: int = 4, summed: bool = True

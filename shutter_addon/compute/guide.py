@@ -11,10 +11,10 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from ..core.caches import LastValue
 from ..core.frames import light
 from ..core.frames.frame_source import FrameSource, SourceWrapper
 from ..core.frames.planes import Decoded, as_rgba
-from ..core.memo import Memo
 from ..core.messages import UserError
 from ..core.pixels.matte_grid import block_sums, blurred
 
@@ -60,7 +60,7 @@ class Guides:
         self._cell = cell_of(self._short)
         self._kept: frozenset[int] = frozenset()
         self._reduced: dict[int, np.ndarray] = {}
-        self._made: Memo[np.ndarray] = Memo()
+        self._made: LastValue[np.ndarray] = LastValue()
 
     def keep(self, indices: Iterable[int]) -> None:
         """Set which frames may be needed from now on, and forget all others."""

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from ..core.caches import RecentValues
 from ..core.frames import light
 from ..core.frames.frame_source import FrameSource, SourceWrapper
 from ..core.frames.planes import Decoded
-from ..core.memo import Kept
 from ..core.model.frame_state import FrameState, Layers
 from ..core.model.mattes import FileFrame, MatteReader, Ramp
 from ..core.pixels import layering
@@ -32,7 +32,7 @@ class RecentFrames(SourceWrapper):
     def __init__(self, source: FrameSource) -> None:
         super().__init__(source)
         self.most = max(8, RECENT_BYTES // (4 * source.width * source.height * np.dtype(source.dtype).itemsize))
-        self._kept: Kept[tuple[str, int], Any] = Kept()
+        self._kept: RecentValues[tuple[str, int], Any] = RecentValues()
 
     def read(self, index: int) -> np.ndarray:
         return self._kept.ask(("read", index), lambda: self._source.read(index), self.most)
@@ -131,7 +131,7 @@ class LayerMattes:
         self, size: tuple[int, int], solve: Callable[[FrameState, int], np.ndarray], reader: MatteReader | None
     ) -> None:
         self._size, self._solve, self._reader = size, solve, reader
-        self._kept: Kept[Hashable, np.ndarray] = Kept()
+        self._kept: RecentValues[Hashable, np.ndarray] = RecentValues()
         self._most = max(KEPT_BYTES // (2 * size[0] * size[1]), 16)
 
     def of(self, layers: Layers, frame: int) -> list[np.ndarray]:

@@ -7,9 +7,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from ..core.caches import RecentValues
 from ..core.frames.frame_source import FrameSource, SourceWrapper
 from ..core.frames.planes import Decoded, Moment, Pair, as_rgba
-from ..core.memo import Kept
 from ..core.model.frame_state import Layers, Options
 from ..core.pixels import compositor, layering
 from .layer_frames import LayerMattes, RecentFrames, linear, with_colors
@@ -42,7 +42,7 @@ class LayerColors:
 
     def __init__(self, source: FrameSource, recent: RecentFrames, mattes: LayerMattes) -> None:
         self._source, self._recent, self._mattes = source, recent, mattes
-        self._kept: Kept[tuple, Any] = Kept()
+        self._kept: RecentValues[tuple, Any] = RecentValues()
 
     def begin(self, layers: Layers, options: Options, shot: range) -> None:
         """Set layers and options for the next frames. shot: the frames that may show what lies behind."""

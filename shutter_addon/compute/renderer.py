@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..core.caches import LastValue
 from ..core.frames.frame_source import FrameSource
-from ..core.memo import Memo
 from ..core.model import scribbles
 from ..core.model.frame_state import FrameState
 from ..core.model.mattes import MatteReader
@@ -81,10 +81,10 @@ class Renderer:
         self._window: Handle = None
         self._kind: tuple[int, bool, int, bool] | None = None
         self.is_short = False
-        self._kept_labels: Memo[list[LabelLayer]] = Memo()
-        self._kept_diffusion: Memo[Handle] = Memo()
-        self._kept_mattes: Memo[Handle] = Memo()
-        self._kept_picture: Memo[Handle] = Memo()
+        self._kept_labels: LastValue[list[LabelLayer]] = LastValue()
+        self._kept_diffusion: LastValue[Handle] = LastValue()
+        self._kept_mattes: LastValue[Handle] = LastValue()
+        self._kept_picture: LastValue[Handle] = LastValue()
 
     def picture(self, request: Request) -> np.ndarray:
         """Return the picture (H, W, 4), top row first: scene-linear float32, premultiplied.

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from . import told
+from . import recent_errors
 
 LONGEST = 300  # characters
 
@@ -16,7 +16,7 @@ class UserError(Exception):
 
     def __init__(self, *arguments: object) -> None:
         super().__init__(*arguments)
-        told.record(level=2)
+        recent_errors.record(level=2)
 
     def __str__(self) -> str:
         return sentence(super().__str__())

@@ -7,7 +7,7 @@ report strokes and files on disk; previews look for these when they are drawn (r
 from collections.abc import Callable, Hashable
 from typing import Any, TypeVar
 
-from .memo import Kept
+from .caches import RecentValues
 
 T = TypeVar("T")
 _MOST = 128  # cached values
@@ -22,7 +22,8 @@ class Revision:
 
     def __init__(self) -> None:
         self.number = 0
-        self._kept: Kept[tuple, tuple[Any, Exception | None]] = Kept()  # results and errors, by number, subject and key
+        # Results and errors, by number, subject and key.
+        self._kept: RecentValues[tuple, tuple[Any, Exception | None]] = RecentValues()
 
     def changed(self) -> None:
         """Count a change, or a possible change."""

@@ -12,7 +12,7 @@ from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TypeVar
 
-from . import told
+from . import recent_errors
 from .stopping import check, once
 
 T = TypeVar("T")
@@ -54,7 +54,7 @@ def _noting(function: Callable[..., object], *arguments: object) -> None:
     try:
         function(*arguments)
     except Exception as error:  # unexpected: functions report other errors themselves
-        told.exception(error)
+        recent_errors.exception(error)
         raise
 
 

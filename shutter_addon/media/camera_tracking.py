@@ -16,9 +16,9 @@ import numpy as np
 from ..core.model import scribbles
 from ..core.model.effect import Region, Subject
 from ..core.model.motions import Motion, Placement, Similarity
-from . import pursuit, registration, tracking
+from . import part_tracking, registration, tracking
 from .footage import Footage
-from .pursuit import Sighting
+from .part_tracking import FoundMotion
 from .registration import Part
 from .tracking import Tracked, TrackingError
 
@@ -78,7 +78,7 @@ class CameraTrack(tracking.Track):
         self._footage.want(frames)
         for frame, after in zip(frames, [*frames[1:], frames[-1]], strict=True):
             with suppress(TrackingError):
-                found, _worth = self._pursuit(frame)
+                found, _worth = self._tracker(frame)
                 self._footage.picture(after)  # frames are read in order before cuts are looked for
                 if self._footage.cut(frame, after) or found.next(after) is not None:
                     return frame
@@ -98,9 +98,9 @@ class CameraTrack(tracking.Track):
             raise TrackingError(BARE)
         return part
 
-    def _pursuit(self, start: int) -> tuple[_Pursuit, float]:
+    def _tracker(self, start: int) -> tuple[_Pursuit, float]:
         found = _Pursuit(self._part, self._footage, start, self._motion)
-        return found, pursuit.distinctness(found.anchor[0], self._footage.size[0])
+        return found, part_tracking.distinctness(found.anchor[0], self._footage.size[0])
 
 
 class _Pursuit:
@@ -121,7 +121,7 @@ class _Pursuit:
         self._last = frame, Similarity()  # the last frame with a motion
         self._speed = Similarity()
 
-    def next(self, frame: int) -> Sighting | None:
+    def next(self, frame: int) -> FoundMotion | None:
         """Return the motion to a frame, or None if it is not found."""
         picture, (before, known) = self._footage.picture(frame), self._last
         sighting = self._compared(picture, self.anchor)
@@ -152,14 +152,14 @@ class _Pursuit:
         astray = [np.median(off[cells == cell]) > _OFF * height for cell in np.unique(cells)]
         return float(np.clip((_MOST - np.mean(astray)) / (_MOST - _FEW), 0, 1)) if astray else 1.0
 
-    def _compared(self, picture: np.ndarray, anchor: tuple[Part, int, Similarity]) -> Sighting:
+    def _compared(self, picture: np.ndarray, anchor: tuple[Part, int, Similarity]) -> FoundMotion:
         """Return the surer motion, starting from its last speed and from its last place."""
         part, _, motion = anchor
         known, sightings = self._last[1], []
         for guess in (self._speed.after(known), known):
             match = part.find(picture, guess.after(motion.inverse()), self._motion)
-            sure = pursuit.confidence(match, picture)
-            sightings.append(Sighting(match.motion.after(motion) if match else known, sure))
+            sure = part_tracking.confidence(match, picture)
+            sightings.append(FoundMotion(match.motion.after(motion) if match else known, sure))
             if sure >= _ANEW:
                 break
         return max(sightings, key=lambda each: each.confidence)

@@ -8,10 +8,10 @@ from itertools import pairwise, product, takewhile
 
 import numpy as np
 
+from ..core.caches import RecentValues
 from ..core.frames import light
 from ..core.frames.frame_source import FrameSource, SourceWrapper
 from ..core.frames.planes import Decoded, Moment, Planes, as_rgba
-from ..core.memo import Kept
 from ..core.messages import MediaError
 
 # Frames on each side that decide about a cut. A film animated on threes has as many pictures there as PySceneDetect
@@ -213,7 +213,7 @@ class ShotSource(SourceWrapper):
         self.step = step
         self.filmed = (source.count - 1) // step + 1
         self._cuts: dict[int, bool] = {}  # {filmed frame: whether there is a cut before it}
-        self._signatures: Kept[int, Signature] = Kept()  # by filmed frame
+        self._signatures: RecentValues[int, Signature] = RecentValues()  # by filmed frame
         self._handed: dict[int, Decoded] = {}
 
     @property  # an attribute would be a cycle, which keeps frames in memory until Python collects it

@@ -15,10 +15,10 @@ from functools import cache, cached_property, lru_cache
 import numpy as np
 
 from ..core import stopping
+from ..core.caches import RecentValues
 from ..core.frames import light
 from ..core.frames.frame_source import FrameSource
 from ..core.frames.planes import STEP, TILE, UNIT, ZERO, Moment
-from ..core.memo import Kept
 from .opencv import cv2
 
 SMALLEST = 16  # pixels; OpenCV's flows need about as many, smaller pictures are cross-faded
@@ -50,8 +50,8 @@ class Between:
         find: gives what `found` gives; None: that"""
         self.ends, self._transfer, self._alpha = (first, second), transfer, alpha
         self._sides: list[_Carriers] | None = None
-        self._paths: Kept[int, tuple[np.ndarray, np.ndarray]] = Kept()
-        self._samples: Kept[tuple[int, int], np.ndarray] = Kept()
+        self._paths: RecentValues[int, tuple[np.ndarray, np.ndarray]] = RecentValues()
+        self._samples: RecentValues[tuple[int, int], np.ndarray] = RecentValues()
         if not np.array_equal(first, second):
             pictures = [luma(end, transfer, alpha) for end in self.ends]
             sides = [_carriers(each) for each in np.split((find or found)(*pictures), 2, axis=2)]
@@ -60,7 +60,7 @@ class Between:
     def with_ends(self, first: np.ndarray, second: np.ndarray) -> Between:
         """Return what lies between two other frames that move alike."""
         other = copy(self)
-        other.ends, other._samples = (first, second), Kept()
+        other.ends, other._samples = (first, second), RecentValues()
         other.__dict__.pop("_encoded", None)
         return other
 

@@ -5,8 +5,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ..core import stopping
+from ..core.caches import RecentValues
 from ..core.frames.frame_source import FrameSource
-from ..core.memo import Kept
 from . import flow, opencv
 
 WIDTH = 960  # the most pixels along the longer side of the pictures
@@ -33,7 +33,7 @@ class Footage:
         self._source, self._index_at = source, index_at
         share = min(1.0, WIDTH / max(source.width, source.height))
         self.size = max(1, round(source.width * share)), max(1, round(source.height * share))
-        self._kept: Kept[int, np.ndarray] = Kept()
+        self._kept: RecentValues[int, np.ndarray] = RecentValues()
         self._wanted: Sequence[int] = ()
 
     def want(self, frames: Sequence[int]) -> None:

@@ -17,7 +17,7 @@ from .carried_mattes import CarriedMattes
 from .carrying import box_around
 from .footage import Footage
 from .opencv import cv2
-from .pursuit import COVERED, LEFT, Sighting
+from .part_tracking import COVERED, LEFT, FoundMotion
 from .subject_mattes import CarriedFile
 from .tracking import Tracked, TrackingError
 
@@ -77,7 +77,7 @@ class MatteTrack(tracking.Track):
     def _cover(self, frame: int) -> np.ndarray:
         return self._covers(frame, self._footage.size)
 
-    def _pursuit(self, start: int) -> tuple[_Pursuit, float]:
+    def _tracker(self, start: int) -> tuple[_Pursuit, float]:
         if not (self._cover(start) > _INSIDE).any():
             raise TrackingError(EMPTY)
         return _Pursuit(self._cover, self._footage, start, self._motion), 1.0
@@ -92,7 +92,7 @@ class _Pursuit:
         self._way: Motion = "scale" if motion == "location" else motion
         self._start, self._last, self._motion, self.reason = frame, frame, Similarity(), COVERED
 
-    def next(self, frame: int) -> Sighting | None:
+    def next(self, frame: int) -> FoundMotion | None:
         """Return the motion to a frame, or None if the subject is not found."""
         before, after = (self._cover(each) for each in (self._last, frame))
         if not (after > _INSIDE).any():
@@ -104,7 +104,7 @@ class _Pursuit:
             self.reason = COVERED
             return None
         self._motion, self._last = self._refined(step.motion.after(self._motion), second, after), frame
-        return Sighting(self._at_middle() if self._asked == "location" else self._motion, step.confidence)
+        return FoundMotion(self._at_middle() if self._asked == "location" else self._motion, step.confidence)
 
     def _at_middle(self) -> Similarity:
         """Return how the middle of what the first matte covers has moved."""
@@ -131,7 +131,7 @@ class _Pursuit:
 
 def moved(
     first: np.ndarray, second: np.ndarray, before: np.ndarray, after: np.ndarray, motion: Motion
-) -> Sighting | None:
+) -> FoundMotion | None:
     """Return how what a matte covers moves from one picture to another, or None if that is unknown.
 
     Args:
@@ -166,4 +166,4 @@ def moved(
     if fitted is None:
         return None
     found, agreeing = fitted
-    return Sighting(found, min(float(agreeing.mean()) / _AGREEING, 1.0) * min(share / _AGREEING, 1.0))
+    return FoundMotion(found, min(float(agreeing.mean()) / _AGREEING, 1.0) * min(share / _AGREEING, 1.0))

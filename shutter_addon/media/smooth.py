@@ -15,9 +15,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..core.caches import RecentValues
 from ..core.frames.frame_source import FrameSource, SourceWrapper
 from ..core.frames.planes import Decoded, Moment, as_rgba
-from ..core.memo import Kept
 from ..core.messages import MediaError
 from ..core.model.motions import Similarity
 from ..core.model.shutters import MAX_WINDOW
@@ -55,8 +55,8 @@ class Repeats:
 
     def __init__(self, source: FrameSource) -> None:
         self._source = source
-        self._pictures: Kept[int, np.ndarray] = Kept()
-        self._changes: Kept[int, float] = Kept()
+        self._pictures: RecentValues[int, np.ndarray] = RecentValues()
+        self._changes: RecentValues[int, float] = RecentValues()
 
     def gap(self, index: int) -> tuple[int, int]:
         """The two frames between which the moments behind a frame lie: itself and the next one; where frames repeat
@@ -116,7 +116,7 @@ class SmoothSource(SourceWrapper):
         self.count = (source.count - 1) * step + 1
         self.fps = None if source.fps is None else source.fps * step
         self.options = {**source.options, "inbetween": step}
-        self._pairs: Kept[tuple[int, int], flow.Between] = Kept()
+        self._pairs: RecentValues[tuple[int, int], flow.Between] = RecentValues()
         self._repeats = Repeats(self._source) if skip_repeats else None
         self.repeats = False
 

@@ -18,7 +18,7 @@ from ..core.model.effect import Region, Subject
 from ..core.model.motions import Motion, Placement, Similarity
 from . import registration
 from .footage import Footage
-from .pursuit import PartPursuit, Sighting, distinctness
+from .part_tracking import FoundMotion, PartTracker, distinctness
 from .registration import Part
 
 PATIENCE = 25  # frames for which a lost subject is searched
@@ -63,7 +63,7 @@ class Pursuit(Protocol):
 
     reason: str
 
-    def next(self, frame: int) -> Sighting | None:
+    def next(self, frame: int) -> FoundMotion | None:
         """Return its motion to a frame, or None if it is not found."""
 
 
@@ -109,12 +109,12 @@ class Track(ABC):
             raise TrackingError(NOT_SHOWN)
         if len(frames) < 2:
             raise TrackingError(ALONE)
-        self._pursuit(start)
+        self._tracker(start)
         return self._both_ways(start, range(min(frames), max(frames) + 1), {*anchors} - {start})
 
     @abstractmethod
-    def _pursuit(self, start: int) -> tuple[Pursuit, float]:
-        """Return the pursuit of what `start` shows, and the confidence that this is the subject.
+    def _tracker(self, start: int) -> tuple[Pursuit, float]:
+        """Return the tracker of what `start` shows, and the confidence that this is the subject.
 
         Raises:
             TrackingError: there is nothing to follow
@@ -161,16 +161,16 @@ class Track(ABC):
     def _from(self, start: int, frames: range) -> Iterator[Tracked]:
         """Track frames in order, away from `start`."""
         self._footage.want(frames)
-        pursuit, worth = self._pursuit(start)
+        tracker, worth = self._tracker(start)
         last, shown = Tracked(frame=start, placement=self._placement(start), confidence=1.0), start
         lost: list[int] = []
         for frame in frames:
             self._footage.picture(frame)  # frames are read in order before cuts are looked for
             if self._footage.cut(shown, frame):
-                fault = pursuit.reason if lost else SHOT_ENDS
+                fault = tracker.reason if lost else SHOT_ENDS
                 yield Tracked(frame=(lost or [frame])[0], placement=last.placement, confidence=0.0, fault=fault)
                 return
-            sighting, shown = pursuit.next(frame), frame
+            sighting, shown = tracker.next(frame), frame
             if sighting is None:
                 lost.append(frame)
                 if len(lost) > PATIENCE:
@@ -182,7 +182,7 @@ class Track(ABC):
             last, lost = seen, []
             yield last
         if lost:
-            yield Tracked(frame=lost[0], placement=last.placement, confidence=0.0, fault=pursuit.reason)
+            yield Tracked(frame=lost[0], placement=last.placement, confidence=0.0, fault=tracker.reason)
 
     def _carried(self, origin: int, frame: int, motion: Similarity, near: Placement) -> Placement:
         before, after = self._centres[origin], self._centres[frame]
@@ -227,11 +227,11 @@ class RegionTrack(Track):
         near = _falloff(away[part.points.imag.astype(int), part.points.real.astype(int)], _NEAR * height).sum()
         return part, min(float(np.clip(near / _ENOUGH_NEAR, _FAR, 1)), distinctness(part, width))
 
-    def _pursuit(self, start: int) -> tuple[PartPursuit, float]:
+    def _tracker(self, start: int) -> tuple[PartTracker, float]:
         if start not in self._parts:
             self._parts[start] = self._part(start)
         part, worth = self._parts[start]
-        return PartPursuit(part, self._footage, start, self._motion), worth
+        return PartTracker(part, self._footage, start, self._motion), worth
 
 
 def _falloff(away: np.ndarray, reach: float) -> np.ndarray:

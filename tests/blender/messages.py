@@ -11,7 +11,7 @@ from _bl_i18n_utils import bl_extract_messages, settings
 from shutter_addon import blender
 from shutter_addon.core.model import effect, scribbles, shutters
 from shutter_addon.core.model.choices import CONTEXT
-from shutter_addon.media import camera_tracking, matte_tracking, pursuit, readout, tracking
+from shutter_addon.media import camera_tracking, matte_tracking, part_tracking, readout, tracking
 
 SOURCES = sorted(Path(blender.__file__).parent.rglob("*.py"))
 
@@ -40,7 +40,7 @@ def of_core() -> set:
 def of_media() -> set:
     """Sentences of media that say why nothing can be tracked or found, which editing passes on in the user's
     language."""
-    modules = tracking, camera_tracking, pursuit, matte_tracking, readout
+    modules = tracking, camera_tracking, part_tracking, matte_tracking, readout
     named = [each for module in modules for each in vars(module).items()]
     return {("*", words) for name, words in named if name.isupper() and isinstance(words, str)}
 

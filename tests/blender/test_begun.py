@@ -101,7 +101,7 @@ def test_what_a_job_takes_away_meanwhile_is_not_missed(film, monkeypatch, look):
         if next(looks) == look:
             found.forget()
 
-    class Kept(set):
+    class RecentValues(set):
         def __rsub__(self, known):
             looked()
             return known
@@ -113,7 +113,7 @@ def test_what_a_job_takes_away_meanwhile_is_not_missed(film, monkeypatch, look):
     taken = snapshot.take(edit, effect, strip, (1, 2, 3))
     for frame in (1, 2):
         found.begin_next(taken, frame, RenderContext(found))
-    found.keep(Kept())
+    found.keep(RecentValues())
     assert next(looks) > look
     assert is_closed.wait(30)
     assert len(closed) == 1

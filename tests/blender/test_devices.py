@@ -85,7 +85,7 @@ def test_the_preference_chooses(effect, preferred):
     """From the next render on, if the command asks for nothing else."""
 
     def composed_by():
-        sessions.settle()
+        sessions.close_if_device_changed()
         picture_of(effect.scene, 1)
         context = sessions.of_render()
         return type(context.renderer(context.request(*job_snapshots.of(effect.scene, 1))).compositor)

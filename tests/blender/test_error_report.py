@@ -26,11 +26,11 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.fixture(autouse=True)
 def _nothing_told():
-    from shutter_addon.core import told
+    from shutter_addon.core import recent_errors
 
-    told._lines = []  # private: what other tests told
+    recent_errors._lines = []  # private: what other tests told
     yield
-    told._lines = []  # private: what other tests told
+    recent_errors._lines = []  # private: what other tests told
 
 
 @pytest.fixture
@@ -186,10 +186,10 @@ def test_without_a_window_the_button_says_where_the_report_is(bpy, edit):
 @pytest.mark.usefixtures("named")
 def test_the_command(tmp_path, capsys):
     """It has the edit's faults as well."""
-    from shutter_addon.core import told
+    from shutter_addon.core import recent_errors
 
     next((tmp_path / NAME / "in").iterdir()).unlink()
-    told._lines = []  # private: what other tests told
+    recent_errors._lines = []  # private: what other tests told
     blend = tmp_path / NAME / f"{NAME}.blend"
     assert command.main(["check", str(blend), "--device", "cpu", "--report"]) == 2
     text = capsys.readouterr().out.partition("### Virtual Shutter")[2]

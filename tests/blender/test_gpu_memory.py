@@ -54,19 +54,19 @@ def test_what_cannot_be_is_a_sentence(command_here, film, tmp_path, megabytes, s
 def test_a_session_gives_back_what_it_took_and_settles_for_another_limit(bpy, edit, effect):
     sessions.forget()
     with render_settings.using(gpu_memory=ROOMY):
-        sessions.settle()
+        sessions.close_if_device_changed()
         picture = picture_of(effect.scene, 1)
         budget = render_settings.memory()
         assert (budget.limit, budget.used > 0) == (ROOMY << 20, True)
         sessions.OFFSCREEN.free()
         assert np.array_equal(picture_of(effect.scene, 1), picture)
     with render_settings.using(gpu_memory=SMALL):
-        sessions.settle()
+        sessions.close_if_device_changed()
         assert budget.used == 0
         assert np.abs(picture_of(effect.scene, 1) - picture).max() <= 2**-14
         budget = render_settings.memory()
         assert (budget.limit, budget.used > 0) == (SMALL << 20, True)
     sessions.forget()
     assert budget.used == 0
-    sessions.settle()
+    sessions.close_if_device_changed()
     assert render_settings.memory().limit > ROOMY << 20

@@ -9,7 +9,7 @@ from shutter_addon import blender
 from shutter_addon.blender import handlers
 from shutter_addon.blender.data import data_format
 from shutter_addon.blender.devices import main_thread
-from shutter_addon.core import told
+from shutter_addon.core import recent_errors
 
 
 @pytest.fixture
@@ -40,12 +40,12 @@ def test_calls_that_wait_are_made_after_a_file_is_loaded_and_the_extension_disab
 
 def test_a_call_that_fails_is_kept_for_the_report_and_ends_nothing(window, capfd):
     timer, made = main_thread.call_waiting, []
-    told._lines = []  # private: what other tests told
+    recent_errors._lines = []  # private: what other tests told
     main_thread.soon(lambda: 1 / 0)
     main_thread.soon(lambda: made.append("next"))
     assert timer() > 0
     assert made == ["next"]
-    assert "ZeroDivisionError [blender/devices/main_thread.py:" in told.last()[0]
+    assert "ZeroDivisionError [blender/devices/main_thread.py:" in recent_errors.last()[0]
     assert "ZeroDivisionError: division by zero" in capfd.readouterr().err
 
 

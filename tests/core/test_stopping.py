@@ -6,7 +6,7 @@ import threading
 import pytest
 
 from shutter_addon.core import stopping
-from shutter_addon.core.memo import Memo
+from shutter_addon.core.caches import LastValue
 
 
 def test_a_thread_is_told_what_was_said_on_it():
@@ -20,7 +20,7 @@ def test_a_thread_is_told_what_was_said_on_it():
 
 
 def test_a_slice_ends_work_and_knows_what_is_kept():
-    memo, over, endless = Memo(), stopping.Slice(-math.inf, -math.inf), stopping.Slice(math.inf, math.inf)
+    memo, over, endless = LastValue(), stopping.Slice(-math.inf, -math.inf), stopping.Slice(math.inf, math.inf)
     with stopping.once(over), pytest.raises(stopping.StoppedError):
         memo.get("key", stopping.check)
     assert not over.has_kept
@@ -35,7 +35,7 @@ def test_a_slice_ends_work_and_knows_what_is_kept():
 
 
 def test_a_slice_ends_soon_once_something_is_kept():
-    memo, slice_ = Memo(), stopping.Slice(-math.inf, math.inf)
+    memo, slice_ = LastValue(), stopping.Slice(-math.inf, math.inf)
     with stopping.once(slice_):
         stopping.check()
         memo.get("key", lambda: 1)

@@ -58,7 +58,7 @@ def steps():
     yield from opened()
     preferences = bpy.context.preferences.addons[NAME].preferences
     preferences.gpu_memory = MEGABYTES
-    sessions().settle()
+    sessions().close_if_device_changed()
     window, offscreen = sessions().WINDOW, sessions().OFFSCREEN
     for device in ("OPENGL", "BLENDER"):
         preferences.device = device
@@ -79,5 +79,5 @@ def steps():
         most = max(most, budget.used)
         saw(**found, after=held(window), kept=held(offscreen), most=most)
     preferences.gpu_memory = MEGABYTES // 4
-    sessions().settle()
+    sessions().close_if_device_changed()
     yield from told_in_the_preview()

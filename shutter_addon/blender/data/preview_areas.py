@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 from bpy.types import Area, Context, PropertyGroup, Scene, Space, Strip
 
-from . import annotations, seen_alone, selection, source_media, strips
+from . import annotations, selection, sole_effect, source_media, strips
 
 _PERCENT = {"PROXY_25": 25, "PROXY_50": 50, "PROXY_75": 75, "PROXY_100": 100}
 _PLAIN_STRIP = {"blend_alpha": 1.0, "color_saturation": 1.0, "scene_input": "CAMERA"}
@@ -102,7 +102,8 @@ def look(context: Context, scene: Scene, effect: PropertyGroup, strip: Strip) ->
     areas = list(_areas_of(context, scene))
     scales = {area.spaces.active: _scale(context, scene, strip, area) for area in areas}
     scales = {space: scale for space, scale in scales.items() if math.isfinite(scale)}
-    is_plain = _is_plain(scene, strip) and all(seen_alone.has(area.spaces.active, _PLAIN_SPACE) for area in areas)
+    spaces = [area.spaces.active for area in areas]
+    is_plain = _is_plain(scene, strip) and all(sole_effect.has_values(space, _PLAIN_SPACE) for space in spaces)
     if not scales:
         return Look(None, None, is_plain)
     space = max(scales, key=scales.__getitem__)
@@ -113,11 +114,11 @@ def _is_plain(scene: Scene, strip: Strip) -> bool:
     """Tell whether the scene shows a strip's picture unchanged."""
     return (
         strip.blend_type in ("REPLACE", "ALPHA_OVER")
-        and seen_alone.has(strip, _PLAIN_STRIP)
+        and sole_effect.has_values(strip, _PLAIN_STRIP)
         and strip.color_multiply in (1, strips.IN_CODE_VALUES)
         and all(modifier.mute for modifier in strip.modifiers)
         and scene.display_settings.display_device == "sRGB"
-        and seen_alone.has(scene.view_settings, seen_alone.STANDARD)
+        and sole_effect.has_values(scene.view_settings, sole_effect.STANDARD)
         and not scene.render.use_multiview
         and not scene.sequence_editor.show_overlay_frame
     )

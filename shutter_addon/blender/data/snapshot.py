@@ -21,7 +21,7 @@ from ...core.model import effect as model
 from ...core.model import following, keyframes, limits, mattes, outlines
 from ...core.model.fields import fields_of
 from ...core.model.frame_state import Options
-from ...core.recipes import baking
+from ...core.recipes import key_fitting
 from ...media.subject_mattes import CarriedFile, Subject
 from . import matte_content, preferences, sampled, source_media, strips, validation
 from .annotations import LAYERS, image_to_picture, layer_of, layers_of, picture_size
@@ -369,10 +369,10 @@ def _camera(sampling: Sampling) -> model.Camera:
 def recipe_of(scene: Scene, effect: PropertyGroup, strip: Strip, contents: Sequence = ()) -> model.Effect:
     """Return the effect as a recipe, whose frame 1 is the strip's first.
 
-    Regions without a shutter are left out, and what baking.baked leaves out.
+    Regions without a shutter are left out, and what key_fitting.with_keys leaves out.
 
     Args:
-        contents: As in baking.baked.
+        contents: As in key_fitting.with_keys.
 
     Raises:
         EffectError: The effect cannot be rendered as it stands.
@@ -387,7 +387,7 @@ def recipe_of(scene: Scene, effect: PropertyGroup, strip: Strip, contents: Seque
         raise EffectError(rpt_('strip "{strip}" is too small to find its scribbles').format(strip=strip.name))
     with translated(rpt_):
         plain = read(scene, effect, strip, sorted({*shown, *keyed}))
-        return baking.baked(plain, shown, contents)
+        return key_fitting.with_keys(plain, shown, contents)
 
 
 def _keyed(scene: Scene, effect: PropertyGroup) -> set[float]:

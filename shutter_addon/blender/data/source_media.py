@@ -11,9 +11,9 @@ import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import Scene, Strip
 
+from ...core.caches import RecentValues
 from ...core.frames.frame_source import FrameSource
 from ...core.frames.retiming import RetimingKey, StripTiming, are_retiming_keys
-from ...core.memo import Kept
 from ...media import MediaError, open_source
 from ...media.files import stamp
 from ...media.opening import with_proxy
@@ -31,7 +31,7 @@ _SEQUENCE = ("char name[64]", "S64"), ("SeqRetimingHandle *retiming_handles", "u
 _KEY = ("double strip_frame_index", "f8"), ("int flag", "i4"), ("float retiming_factor", "f4")
 
 
-_known: Kept[Hashable, Any] = Kept()  # what `stamps` and `spec` return
+_known: RecentValues[Hashable, Any] = RecentValues()  # what `stamps` and `spec` return
 
 
 def media_key(strip: Strip) -> tuple:

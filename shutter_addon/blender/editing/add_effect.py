@@ -15,7 +15,7 @@ from bpy.types import PropertyGroup, Scene, Strip, StripsTopLevel, bpy_struct
 from ...core.frames.frame_source import FrameSource
 from ...core.model.limits import MAX_FRAME
 from ...media import color
-from ..data import data_format, fcurves, seen_alone, source_media
+from ..data import data_format, fcurves, sole_effect, source_media
 from ..data.annotations import new_annotation
 from ..data.property_copy import for_a_while
 from ..data.strips import ENGINE, Shown, effect_of, nearest_source, origin, overlap, shown_effects
@@ -50,7 +50,7 @@ def add_effect(scene: Scene, source: Strip) -> tuple[Strip, PropertyGroup]:
     copy_look(source, strip)
     config = source_media.spec(source).options["config"]
     keeps = color.keeps(scene.sequencer_colorspace_settings.name, config)
-    if not keeps and medium.alpha == "opaque" and seen_alone.hides(scene, strip):
+    if not keeps and medium.alpha == "opaque" and sole_effect.covers_all(scene, strip):
         strip.blend_type = "REPLACE"  # Blender changes colors when it blends strips
     effect = data_format.new_effect(scene, data_format.FORMAT)
     effect.name, effect.scene, effect.start = strip.name, effect_scene, origin(strip)

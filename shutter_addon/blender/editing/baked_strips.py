@@ -33,7 +33,7 @@ def check(scene: Scene, strip: Strip) -> None:
     _channel(scene, strip)
 
 
-def lay(scene: Scene, strip: Strip, film: Film) -> Strip:
+def add_strip(scene: Scene, strip: Strip, film: Film) -> Strip:
     """Add the baked strip of a finished film above its effect strip, which is muted, and return it.
 
     It replaces the strip of an older bake.

@@ -24,7 +24,7 @@ from bpy.types import PropertyGroup, Scene, Strip, bpy_struct
 
 from ...core.model.limits import MAX_FRAME
 from ...media import MediaError, open_source
-from ..data import data_format, fcurves, requirements, seen_alone, source_media, strips
+from ..data import data_format, fcurves, requirements, sole_effect, source_media, strips
 from ..data.annotations import LAYERS, USERS, picture_size
 from ..data.property_copy import copy_properties
 from ..rendering import invalidation, render_job, sessions
@@ -393,13 +393,13 @@ def _follow_mixing(strip: Strip, source: Strip, *, is_encoded: bool) -> None:
         return
     scene, path = strip.id_data, strip.path_from_id()
     mixes = (
-        not seen_alone.has(strip.transform, seen_alone.IN_PLACE)
+        not sole_effect.has_values(strip.transform, sole_effect.IN_PLACE)
         or strip.transform.filter.startswith("CUBIC")
-        or seen_alone.has_animation(scene, f"{path}.transform.")
+        or sole_effect.has_animation(scene, f"{path}.transform.")
     )
     same_space = source_media.reading(source)[0] == scene.sequencer_colorspace_settings.name
     factor = strips.IN_CODE_VALUES if mixes and is_encoded and same_space else 1
-    if strip.color_multiply != factor and not seen_alone.has_animation(scene, f"{path}.color_multiply"):
+    if strip.color_multiply != factor and not sole_effect.has_animation(scene, f"{path}.color_multiply"):
         strip.color_multiply = factor
 
 

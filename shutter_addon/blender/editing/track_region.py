@@ -23,7 +23,7 @@ from ...core.model import limits, presence
 from ...core.model.effect import Camera, Region
 from ...core.model.frame_state import Options
 from ...core.model.keyframes import Samples
-from ...media import camera_tracking, matte_tracking, pursuit, tracking
+from ...media import camera_tracking, matte_tracking, part_tracking, tracking
 from ...media.footage import Footage
 from ...media.tracking import Tracked
 from ..data import selection, snapshot, strips, validation
@@ -209,7 +209,7 @@ def confidence_at(effect: PropertyGroup, index: int | None, frame: float) -> flo
 def next_unsure(effect: PropertyGroup, index: int | None, frame: float) -> int | None:
     """Return the least confident frame of the next stretch of unsure frames, or None."""
     frames, confidence = MotionKeys(effect, index, "LOCATION").confidence()
-    unsure = (frames <= limits.MAX_FRAME) & (confidence < pursuit.SURE)
+    unsure = (frames <= limits.MAX_FRAME) & (confidence < part_tracking.SURE)
     begins = np.flatnonzero(unsure & ~np.append(False, unsure[:-1]) & (frames > frame))
     if not len(begins):
         return None
@@ -225,7 +225,7 @@ def faults(effect: PropertyGroup, index: int | None) -> list[tuple[int, str, boo
 
 def lost(effect: PropertyGroup, index: int | None) -> tuple[int, str] | None:
     """Return the timeline frame where tracking lost the subject, and a note in the user's language, or None."""
-    frame = pursuit.lost(*MotionKeys(effect, index, "LOCATION").confidence())
+    frame = part_tracking.lost(*MotionKeys(effect, index, "LOCATION").confidence())
     if frame is None:
         return None
     words = rpt_(

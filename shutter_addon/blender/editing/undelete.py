@@ -8,7 +8,7 @@ from __future__ import annotations
 import bpy
 from bpy.types import PropertyGroup, Scene, Strip, bpy_prop_collection, bpy_struct
 
-from ...core.memo import Kept
+from ...core.caches import RecentValues
 from ..data import data_format, fcurves, property_copy, recipe_import, strips
 from ..data.annotations import annotation
 from . import add_effect, match_source
@@ -18,7 +18,7 @@ _COPIED = "copied"  # key of the copied effect
 _OWN = {"name", "identity", "source", "start"}  # properties of an effect that pasting keeps
 # What `new` of a collection needs of an item.
 _NEW: dict[str, tuple[str, ...]] = {"frames": ("frame_number",), "modifiers": ("type",), "strokes": ()}
-_effects: Kept[str, dict] = Kept()
+_effects: RecentValues[str, dict] = RecentValues()
 
 
 def keep(effect: PropertyGroup) -> None:

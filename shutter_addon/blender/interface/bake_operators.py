@@ -58,7 +58,7 @@ def bake(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] |
         if bpy.app.background:
             baked_film.render(self.edit, effect, self.effect_strip, film, lambda: None)
         if film.is_finished():
-            baked_strips.lay(self.edit, self.effect_strip, film)
+            baked_strips.add_strip(self.edit, self.effect_strip, film)
             return None
         _bake.running = baked_film.start(self.edit, effect, self.effect_strip, film)
     except (film_output.OutputError, OSError) as error:
@@ -114,7 +114,7 @@ def _lay(job: baked_film.BakeJob) -> str | None:
     if not parts:
         return rpt_('the strip was removed during the bake; its film is "{path}"').format(path=job.film.place)
     try:
-        baked_strips.lay(scene, next((part for part in parts if part.name == job.strip), parts[0]), job.film)
+        baked_strips.add_strip(scene, next((part for part in parts if part.name == job.strip), parts[0]), job.film)
     except (EffectError, RuntimeError) as error:
         return messages.sentence(error)
     with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):

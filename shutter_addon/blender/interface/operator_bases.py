@@ -8,7 +8,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import EnumProperty
 from bpy.types import Context, Event, Operator, PropertyGroup
 
-from ...core import told
+from ...core import recent_errors
 from ...core.messages import UserError
 from ...core.recipes import recipe
 from ..data import selection
@@ -30,7 +30,7 @@ def redraw(context: Context) -> None:
 
 def report(operator: Operator, sentence: str, kind: str = "WARNING") -> None:
     """Report a translated sentence as a warning or error, and keep it for *Copy Report* without its names."""
-    told.record(level=2)
+    recent_errors.record(level=2)
     operator.report({kind}, sentence)
 
 

@@ -94,7 +94,7 @@ def _draw() -> None:
     decision = previews.take_decision()
     if bpy.app.is_job_running("RENDER") or render_job.ends_films():
         return
-    invalidation.drop_lesser()
+    invalidation.drop_reduced()
     # Blender does not report strokes, but it redraws the preview after them.
     scene = selection.scene_of(context)
     if scene is not None and scene.library is None and invalidation.invalidate_changed(scene):

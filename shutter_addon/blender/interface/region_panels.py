@@ -4,7 +4,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.types import MovieTracking, PropertyGroup, Scene, Strip, UILayout
 
 from ...core.messages import EffectError
-from ...media.pursuit import SURE
+from ...media.part_tracking import SURE
 from ..data import selection, strips, validation
 from ..editing import track_region
 from . import needs, track_operators

@@ -20,7 +20,7 @@ from bpy.types import Scene, Strip
 from ...core import atomic_write, stopping
 from ...core.pixels.shown_levels import Display
 from ...media import color
-from ..data import seen_alone, strips
+from ..data import sole_effect, strips
 from ..rendering import job_snapshots, pictures, render_job, sessions
 from ..rendering.effect_source import FULL, in_words
 from ..rendering.render_job import Where
@@ -39,7 +39,7 @@ class _Film:
         changed: Restores the edit.
         strip: Name of the file's strip; None: not added yet.
         file: The file of levels; None: not made yet.
-        makes_levels: The result of seen_alone.makes_levels; None: unknown.
+        makes_levels: The result of sole_effect.has_known_levels; None: unknown.
         has_begun: Whether a frame was rendered.
     """
 
@@ -74,8 +74,8 @@ def before_frame(scene: Scene) -> None:
         film.has_begun = True
         return
     if film.makes_levels is None or render_job.scripts_act():
-        film.makes_levels = seen_alone.makes_levels(scene)
-    seen = seen_alone.alone(scene, scene.frame_current, film.strip) if film.makes_levels else None
+        film.makes_levels = sole_effect.has_known_levels(scene)
+    seen = sole_effect.strip_at(scene, scene.frame_current, film.strip) if film.makes_levels else None
     is_fed = seen is not None and _feed(film, scene, *seen)
     shown = film.strip and scene.sequence_editor.strips_all.get(film.strip)
     if shown and shown.mute == is_fed:  # changes are slow

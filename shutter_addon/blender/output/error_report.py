@@ -15,7 +15,7 @@ import bpy
 import gpu
 from bpy.types import PropertyGroup, Scene, Strip
 
-from ...core import told
+from ...core import recent_errors
 from ...core.messages import UserError
 from ...devices.device import MEGABYTE, NoDeviceError
 from ..data import snapshot, source_media, strips, versions
@@ -32,9 +32,9 @@ def text(scene: Scene | None) -> str:
         try:
             lines.extend(part())
         except Exception as error:  # the edit or a driver can be broken in any way
-            told.exception(error)
+            recent_errors.exception(error)
             lines.append("- the rest cannot be told: see the last error")
-    last = [f"- {line}" for line in told.last()]
+    last = [f"- {line}" for line in recent_errors.last()]
     return "\n".join([*lines, "", "Last errors and warnings", "", *(last or ["- none"]), ""])
 
 

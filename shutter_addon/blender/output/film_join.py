@@ -10,7 +10,7 @@ from ...core import threads
 from ...core.frames import frame_ranges
 from ...media import rendered_pictures
 from ...media.rendered_pictures import RenderedPicture
-from ..data import seen_alone, strips
+from ..data import sole_effect, strips
 from . import film_output
 from .film_output import OutputError
 
@@ -151,7 +151,7 @@ def _keep_colours(scene: Scene, suffix: str, first: RenderedPicture) -> str | No
         shown.view_settings.view_transform = "Standard"
     except TypeError:
         raise OutputError("PNG frames need the view Standard, which this OpenColorIO configuration lacks") from None
-    for name, value in seen_alone.PLAIN_VIEW.items():
+    for name, value in sole_effect.PLAIN_VIEW.items():
         setattr(shown.view_settings, name, value)
     if first.samples == "uint8":
         scene.render.dither_intensity = 0  # they are dithered already

@@ -6,9 +6,9 @@ import traceback
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from ...core import told
+from ...core import recent_errors
+from ...core.caches import RecentValues
 from ...core.frames.frame_source import FrameSource
-from ...core.memo import Kept
 from ...core.messages import EffectError, of_file
 from ...core.model.clip import Clip
 from ...core.model.frame_state import Options
@@ -32,7 +32,7 @@ def in_words(error: BaseException) -> str:
         return "the render was stopped"
     if isinstance(error, OSError) and error.filename:
         return of_file(error)
-    told.exception(error)
+    recent_errors.exception(error)
     traceback.print_exception(error)
     return f"internal error: {error!r}"
 
@@ -52,7 +52,7 @@ class Detail:
     smooth: bool = True
 
 
-_steps: Kept[tuple, int] = Kept()  # steps from a filmed frame to the next, by steps_key
+_steps: RecentValues[tuple, int] = RecentValues()  # steps from a filmed frame to the next, by steps_key
 _KEPT = 64
 
 FULL = Detail()  # of renders

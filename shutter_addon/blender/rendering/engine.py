@@ -28,7 +28,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
         try:
             self._render(depsgraph, called_by_script=render_job.script_waits(inspect.currentframe()))
         except BaseException as error:  # otherwise Blender prints it, and renders the frame without the effect
-            invalidation.spoil(depsgraph.scene.session_uid)
+            invalidation.mark_failed(depsgraph.scene.session_uid)
             if not isinstance(error, StoppedError):
                 self.fail(effect_source.in_words(error))
             elif not self.test_break():
@@ -46,7 +46,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
             shown, frame, detail = asked.snapshot, asked.frame, asked.request.source.detail
             is_drawn, stopped = asked.is_drawn, asked.stopped
         if detail != effect_source.FULL or is_drawn:
-            invalidation.keep_until_drawn(scene.session_uid)
+            invalidation.mark_reduced(scene.session_uid)
         if is_drawn:
             return  # without a result, which is fastest for Blender
         last = job_snapshots.running.pictures.get(scene.session_uid) if render_job.where() is Where.JOB else None
@@ -60,7 +60,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
             if asked is None or stopped is None:
                 raise
             previews.looking.decision = replace(asked, is_late=True)
-            invalidation.keep_until_drawn(scene.session_uid)
+            invalidation.mark_reduced(scene.session_uid)
             return
         picture = pictures.resized(picture, width, height, detail.divisor)
         self._show(picture)

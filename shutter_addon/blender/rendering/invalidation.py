@@ -51,26 +51,26 @@ def forget() -> None:
     revision.changed()
 
 
-def spoil(scene: int) -> None:
+def mark_failed(scene: int) -> None:
     """Note that a picture of an effect scene failed."""
     _frames.failed.add(scene)
 
 
-def drop_spoilt() -> None:
+def drop_failed() -> None:
     """Drop frames that failed: the sequencer would show them again without calling the engine."""
     _drop(_frames.failed)
 
 
-def keep_until_drawn(scene: int) -> None:
+def mark_reduced(scene: int) -> None:
     """Note that the sequencer got a reduced picture of an effect scene for a preview.
 
     Blender would share it with renders, scopes and the color picker, so the draw handler drops it.
     """
     _frames.reduced.add(scene)
-    main_thread.later(drop_lesser)  # in case the handler is not called
+    main_thread.later(drop_reduced)  # in case the handler is not called
 
 
-def drop_lesser() -> None:
+def drop_reduced() -> None:
     """Drop reduced frames for previews."""
     _drop(_frames.reduced)
 

@@ -293,7 +293,7 @@ class RenderSession:
         ended.shutdown(wait=False)
         self._chosen = None
 
-    def settle(self) -> None:
+    def close_if_device_changed(self) -> None:
         """Forget everything if another device would be chosen now."""
         with suppress(NoDeviceError):  # raised again when a picture is asked for
             if self._chosen is None or self._chosen[0] == self._choose()[0]:

@@ -56,17 +56,17 @@ def of_render(
     """Return the context of a render, on a device that needs no window. NoDeviceError: there is none."""
     session = OFFSCREEN
     if render_job.where() is Where.WAITED_FOR:
-        WAITED_FOR.settle()  # no handler runs when such a film begins
+        WAITED_FOR.close_if_device_changed()  # no handler runs when such a film begins
         session = WAITED_FOR if OFFSCREEN.device == "relayed" else OFFSCREEN
     return RenderContext(session, say, levels=levels, display=display)
 
 
-def settle() -> None:
+def close_if_device_changed() -> None:
     """Use the device and memory that the user wants now, before a render, on the main thread."""
     if render_settings.forget_memory_if_changed():
         forget()
     WAITED_FOR.forget()  # its frames take main memory
-    OFFSCREEN.settle()
+    OFFSCREEN.close_if_device_changed()
 
 
 def end_job() -> None:

@@ -17,7 +17,7 @@ from bpy.types import PropertyGroup
 from ...compute.renderer import Renderer
 from ...compute.request import Request
 from ...core import threads
-from ...core.memo import Kept
+from ...core.caches import RecentValues
 from ...core.model import windows
 from ...core.model.frame_state import FrameState
 from ...core.model.motions import Similarity
@@ -42,7 +42,7 @@ class _Measuring:
         job: What is measured now.
     """
 
-    moved: Kept[tuple, smooth.Moved | None] = field(default_factory=Kept)
+    moved: RecentValues[tuple, smooth.Moved | None] = field(default_factory=RecentValues)
     looks: dict[int, tuple[float | None, float | None, bool]] = field(default_factory=dict)
     wanted: tuple[SourceSpec, int] | None = None
     job: Future | None = None

@@ -49,7 +49,7 @@ _Eased = Sequence[tuple[float, Ease]]
 _Fits = Callable[[float, float, float, float], bool]
 
 
-def baked(effect: Effect, shown: range, contents: Iterable[FileContent | RampContent] = ()) -> Effect:
+def with_keys(effect: Effect, shown: range, contents: Iterable[FileContent | RampContent] = ()) -> Effect:
     """Return a recipe's effect for an effect that is shown at some frames, the first of which is the recipe's frame 1.
 
     Channels are sampled at these frames, at their keys and at drawings. The result leaves out regions without strokes

@@ -34,7 +34,7 @@ _BRIEF, _LEFT = 8, 3  # unsure frames after which a subject is lost: between sur
 _NONE = np.zeros(0, complex)
 
 
-class Sighting(NamedTuple):
+class FoundMotion(NamedTuple):
     """A motion from the first picture to another one, with its confidence 0 … 1.
 
     held: (n,) complex, the corners in the picture that agree with it"""
@@ -44,7 +44,7 @@ class Sighting(NamedTuple):
     held: np.ndarray = _NONE
 
 
-class PartPursuit:
+class PartTracker:
     """Follows a part of a picture.
 
     Attributes:
@@ -62,7 +62,7 @@ class PartPursuit:
         self._seen = deque([(footage.picture(frame), Similarity(), 1.0)], _BACK)
         self._trust = 1.0  # the confidence that this is still the part
 
-    def next(self, frame: int) -> Sighting | None:
+    def next(self, frame: int) -> FoundMotion | None:
         """Return its motion to a frame, or None if it is not found."""
         picture, missed = self._footage.picture(frame), self._missed
         sighting = None if missed else self._near(picture, self._speed.after(self._known))
@@ -83,9 +83,9 @@ class PartPursuit:
         if missed:
             self._seen.clear()
         self._seen.append((picture, sighting.motion, sighting.confidence))
-        return Sighting(sighting.motion, self._trust)
+        return FoundMotion(sighting.motion, self._trust)
 
-    def _trusted(self, picture: np.ndarray, sighting: Sighting, goes_on: bool) -> float:
+    def _trusted(self, picture: np.ndarray, sighting: FoundMotion, goes_on: bool) -> float:
         """Return the confidence that this is still the part.
 
         It stays as before as far as the corners come from the part's last place. If they all do, it is at least the
@@ -103,7 +103,7 @@ class PartPursuit:
         was_lost = sighting.confidence >= SURE and (self._trust < SURE or not goes_on)
         return kept if was_lost and self._first.lookalike(picture, sighting.motion) else sighting.confidence
 
-    def _held(self, picture: np.ndarray, sighting: Sighting) -> float | None:
+    def _held(self, picture: np.ndarray, sighting: FoundMotion) -> float | None:
         """Return the share of its corners that come from its place some pictures before, up to 1.
 
         They come from elsewhere if tracking slipped onto something else. None: too few can be traced.
@@ -116,17 +116,17 @@ class PartPursuit:
             return None
         return min(float((off < _ASTRAY * max(self._first.box[2:])).mean()) / _AGREEING, 1.0)
 
-    def _near(self, picture: np.ndarray, guess: Similarity) -> Sighting | None:
+    def _near(self, picture: np.ndarray, guess: Similarity) -> FoundMotion | None:
         """Find the part near a guess by its first look or, if that is not sure, by a later one."""
         match = self._first.find(picture, guess, self._motion)
         sure = confidence(match, picture)
         if match and sure >= SURE:
             self._first.learn(match)
         if match and sure >= _FADING:
-            return Sighting(match.motion, sure, match.held)
+            return FoundMotion(match.motion, sure, match.held)
         later = self._by_later_look(picture, guess)
         if later is None:
-            return Sighting(match.motion, sure, match.held) if match and sure >= _LOST else None
+            return FoundMotion(match.motion, sure, match.held) if match and sure >= _LOST else None
         points = self._first.points
         if sure < SURE and np.abs(later.motion(points) - guess(points)).max() > 1:
             # starting from there, the first look may be found
@@ -135,9 +135,9 @@ class PartPursuit:
                 match, sure = again, confidence(again, picture)
         if match is None or sure < min(SURE, later.confidence):
             return later
-        return Sighting(match.motion, sure, match.held)
+        return FoundMotion(match.motion, sure, match.held)
 
-    def _by_later_look(self, picture: np.ndarray, guess: Similarity) -> Sighting | None:
+    def _by_later_look(self, picture: np.ndarray, guess: Similarity) -> FoundMotion | None:
         if self._look.part is self._first:
             self._look_anew()
         sighting = self._look.find(picture, guess, self._motion)
@@ -152,7 +152,7 @@ class PartPursuit:
         if later := self._first.again(picture, motion):
             self._look = _Look(later, motion, max(_DRIFT * worth, _LEAST))
 
-    def _elsewhere(self, picture: np.ndarray, missed: int, *looks: _Look) -> Sighting | None:
+    def _elsewhere(self, picture: np.ndarray, missed: int, *looks: _Look) -> FoundMotion | None:
         """Find the part by its first look or by others, in the area where it may be by now."""
         radius = _AROUND * picture.shape[1] * (1 + missed / 4)
         sightings = []
@@ -161,7 +161,7 @@ class PartPursuit:
             for guess in (from_there, look.part.seek(picture, from_there, radius)):
                 match = look.part.find(picture, guess, self._motion) if guess else None
                 if match and (sure := confidence(match, picture)) >= _AGAIN:
-                    sightings.append(Sighting(match.motion.after(look.motion), look.worth * sure, match.held))
+                    sightings.append(FoundMotion(match.motion.after(look.motion), look.worth * sure, match.held))
         return max(sightings, key=lambda each: each.confidence, default=None)
 
 
@@ -173,14 +173,14 @@ class _Look:
     motion: Similarity
     worth: float
 
-    def find(self, picture: np.ndarray, guess: Similarity, motion: Motion) -> Sighting | None:
+    def find(self, picture: np.ndarray, guess: Similarity, motion: Motion) -> FoundMotion | None:
         """Find the part by its motion or, if corners do not agree on that, by its location."""
         guess = guess.after(self.motion.inverse())
         ways: list[tuple[Motion, float]] = [(motion, 1.0), ("location", _SHIFTED)]
         for way, share in ways:
             match = self.part.find(picture, guess, way)
             if match and (sure := confidence(match, picture)) >= _LOST:
-                return Sighting(match.motion.after(self.motion), share * self.worth * sure, match.held)
+                return FoundMotion(match.motion.after(self.motion), share * self.worth * sure, match.held)
         return None
 
 

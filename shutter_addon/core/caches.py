@@ -11,7 +11,7 @@ K = TypeVar("K", bound=Hashable)
 T = TypeVar("T")
 
 
-class Memo(Generic[T]):
+class LastValue(Generic[T]):
     """The last value, with its key of plain values. It is made again for another key.
 
     Attributes:
@@ -41,7 +41,7 @@ class Memo(Generic[T]):
         self._kept = None
 
 
-class Kept(dict[K, T]):
+class RecentValues(dict[K, T]):
     """The last used values by keys of plain values, the least recently used first."""
 
     def ask(self, key: K, make: Callable[[], T], most: int) -> T:

@@ -24,31 +24,31 @@ STANDARD = PLAIN_VIEW | {"view_transform": "Standard"}
 _LEVELS = {"color_depth": "8", "color_management": "FOLLOW_SCENE"}
 
 
-def has(item: bpy_struct, values: Mapping[str, object]) -> bool:
+def has_values(item: bpy_struct, values: Mapping[str, object]) -> bool:
     """Tell whether an item's properties have these values."""
     return all(getattr(item, name) == value for name, value in values.items())
 
 
-def hides(scene: Scene, strip: Strip) -> bool:
+def covers_all(scene: Scene, strip: Strip) -> bool:
     """Tell whether an effect strip's picture, where it is opaque, covers all below unchanged, at all frames."""
     size, shown = scene.render, strip.scene.render
     return (
         strip.blend_type in ("REPLACE", "ALPHA_OVER")
-        and has(strip, _PLAIN_STRIP)
-        and has(strip.transform, IN_PLACE)
-        and has(strip.crop, _UNCROPPED)
+        and has_values(strip, _PLAIN_STRIP)
+        and has_values(strip.transform, IN_PLACE)
+        and has_values(strip.crop, _UNCROPPED)
         and strip.strobe <= 1  # 0 or 1 shows all frames: defaults of Blender 5.2 and 5.3
         and not strip.modifiers
         and not strip.retiming_keys
-        and has(size, _WHOLE)
-        and has(shown, _UNMARKED)
+        and has_values(size, _WHOLE)
+        and has_values(shown, _UNMARKED)
         and (shown.resolution_x, shown.resolution_y) == (size.resolution_x, size.resolution_y)
         and not has_animation(scene, f'sequence_editor.strips_all["{bpy.utils.escape_identifier(strip.name)}"]')
     )
 
 
-def alone(scene: Scene, frame: int, but: str | None = None) -> tuple[Strip, bool] | None:
-    """Return the effect strip that alone is seen of a scene at a frame (`hides`), and whether Blender blends it.
+def strip_at(scene: Scene, frame: int, but: str | None = None) -> tuple[Strip, bool] | None:
+    """Return the effect strip that alone is seen of a scene at a frame (`covers_all`), and whether Blender blends it.
 
     Blending it over something changes bits.
 
@@ -64,7 +64,7 @@ def alone(scene: Scene, frame: int, but: str | None = None) -> tuple[Strip, bool
         if strip.type != "SOUND" and strip.name != but and frame in requirements.shown_frames(scene, strip)
     ]
     top = max(seen, key=lambda strip: strip.channel, default=None)
-    if top is None or top not in strips.effect_strips(scene) or not hides(scene, top):
+    if top is None or top not in strips.effect_strips(scene) or not covers_all(scene, top):
         return None
     # An input of an effect strip is not seen itself.
     inputs = [getattr(strip, name, None) for strip in seen for name in ("input_1", "input_2")]
@@ -78,7 +78,7 @@ def alone(scene: Scene, frame: int, but: str | None = None) -> tuple[Strip, bool
     return top, is_blended
 
 
-def makes_levels(scene: Scene) -> bool:
+def has_known_levels(scene: Scene) -> bool:
     """Tell whether a scene's render makes 8-bit levels of the sequencer's picture by sRGB alone."""
     return (
         bpy.app.version < _KNOWN_TO
@@ -86,11 +86,11 @@ def makes_levels(scene: Scene) -> bool:
         and bpy.data.colorspace.working_space == "Linear Rec.709"
         and scene.sequencer_colorspace_settings.name == "sRGB"
         and scene.display_settings.display_device == "sRGB"
-        and has(scene.view_settings, STANDARD)
-        and has(scene.render.image_settings, _LEVELS)
+        and has_values(scene.view_settings, STANDARD)
+        and has_values(scene.render.image_settings, _LEVELS)
         and scene.render.image_settings.file_format in ("FFMPEG", "PNG", "JPEG")
         and scene.render.image_settings.color_mode in ("RGB", "RGBA")  # Blender makes grey from light
-        and has(scene.render, _PLAIN_RENDER)
+        and has_values(scene.render, _PLAIN_RENDER)
         and scene.frame_subframe == 0
         and not any(has_animation(scene, name) for name in ("view_settings", "render.", "display_settings"))
     )

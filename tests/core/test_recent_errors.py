@@ -3,7 +3,7 @@ import threading
 
 import pytest
 
-from shutter_addon.core import threads, told
+from shutter_addon.core import recent_errors, threads
 from shutter_addon.core.messages import EffectError, MediaError
 from shutter_addon.core.recipes import recipe_file
 from shutter_addon.core.recipes.recipe import RecipeError
@@ -12,9 +12,9 @@ from shutter_addon.media.files import check_file
 
 @pytest.fixture(autouse=True)
 def _nothing_told():
-    told._lines = []  # private: what other tests told
+    recent_errors._lines = []  # private: what other tests told
     yield
-    told._lines = []  # private: what other tests told
+    recent_errors._lines = []  # private: what other tests told
 
 
 def missing(folder):
@@ -23,37 +23,37 @@ def missing(folder):
 
 
 def test_an_error_is_kept_once_as_the_line_that_made_it_and_the_oldest_go(tmp_path, monkeypatch):
-    monkeypatch.setattr(told, "MOST", 2)
+    monkeypatch.setattr(recent_errors, "MOST", 2)
     for _ in range(3):
         missing(tmp_path)
-    (kept,) = told.last()
+    (kept,) = recent_errors.last()
     raised = r'\d+ s: raise MediaError\(f"\{path.name\}: no such file in \{.*\}"\) \[media/files\.py:\d+\]'
     assert re.fullmatch(raised, kept)
     (tmp_path / "Qanarix.json").write_text('{"version": 1, "window": 4, "shutters": [{"name": "A"}]}')
     with pytest.raises(RecipeError):
         recipe_file.load(tmp_path / "Qanarix.json")
-    inner, outer = told.last()
+    inner, outer = recent_errors.last()
     assert 'raise RecipeError(f"{place}: {message}") [core/recipes/recipe_check.py:' in inner
     assert 'raise RecipeError(f"{path}: {error}") from None [core/recipes/recipe_file.py:' in outer
     missing(tmp_path)
-    assert outer in told.last()
-    assert re.fullmatch(raised, told.last()[-1])
+    assert outer in recent_errors.last()
+    assert re.fullmatch(raised, recent_errors.last()[-1])
 
 
 def test_lines_and_errors_of_other_code_are_not_kept():
-    told.record()
+    recent_errors.record()
     EffectError("Qanarix is gone")
     with pytest.raises(ValueError, match="invalid") as raised:
         int("invalid")
-    told.exception(raised.value)
-    assert told.last() == []
+    recent_errors.exception(raised.value)
+    assert recent_errors.last() == []
 
 
 def test_an_error_that_nobody_expected_is_kept_without_what_it_says():
     with pytest.raises(TypeError) as raised:
         check_file(lambda: "a name")
-    told.exception(raised.value)
-    (kept,) = told.last()
+    recent_errors.exception(raised.value)
+    (kept,) = recent_errors.last()
     assert re.fullmatch(r"\d+ s: TypeError \[media/files\.py:\d+ check_file\]", kept)
 
 
@@ -63,5 +63,5 @@ def test_what_a_thread_raises_that_nobody_waits_for(monkeypatch):
     monkeypatch.setattr(threading, "excepthook", lambda raised: printed.append(raised.exc_type))
     threads.daemon(check_file, lambda: "a name").join()
     assert printed == [TypeError]
-    (kept,) = told.last()
+    (kept,) = recent_errors.last()
     assert re.fullmatch(r"\d+ s: TypeError \[.* check_file < .*\]", kept)
