@@ -15,7 +15,7 @@ def filled(device):
         made = make(width, height, layers, kind)
         components, _, dtype = FORMATS[kind]
         nothing = np.nan if np.dtype(dtype).kind == "f" else np.iinfo(dtype).max
-        with suppress(TypeError):  # Blender's writes no such format
+        with suppress(KeyError):  # Blender's writes no such format
             for layer in range(layers):
                 device.write(made, np.full((height, width, components), nothing, dtype), layer)
         return made
