@@ -368,4 +368,5 @@ class GPUCompositor:
     def release(self) -> None:
         with self.device.freeing():
             self._textures.release()
+        self._displayed.clear()
         self.device.release()

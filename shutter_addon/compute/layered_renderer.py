@@ -30,7 +30,7 @@ class LayeredRenderer:
         compositor: composes the parts
         stages: lays them over one another
         source: the footage
-        guides: note its frames for the diffusion
+        guides: take its frames, for the diffusion
         mattes: reads the values of mattes
         solve: returns coefficients (N, h, w) float32 of a state (Layers.scribbles) at a frame of a source
     """
@@ -52,7 +52,7 @@ class LayeredRenderer:
         self._colors = plates.LayerColors(noted, self.recent, self.mattes)
         self._layers: Layers | None = None
         self._windows: dict[tuple, Handle] = {}
-        self._loaded: dict[tuple[int, int], tuple] = {}  # of `_keys`, for the frames in the windows
+        self._loaded: dict[tuple[int, int], tuple] = {}  # keys of frames (f, f), and camera motions (f, g)
         self._crowd = 1  # the factor of the room that windows leave for one another
 
     @property

@@ -26,6 +26,7 @@ from .files import check_file, check_index, check_name, check_size
 ANSWER = "Virtual Shutter decodes"  # the beginning of an answer's line, since Blender prints other lines as well
 ANSWERING = 120  # seconds after which a process is killed if it does not answer; no frame takes as long
 ENDING = 5  # seconds after which it is killed if it does not end
+_FLOAT_ERROR = 2**-23  # the relative error of Blender's floats
 _PIPE = 1 << 20  # the pipe's bytes, if they can be set; with 64 KB a frame takes twice as long
 
 
@@ -97,9 +98,11 @@ class BlenderMovie(FrameSource):
 
 
 def frame_rate(number: float) -> Fraction:
-    """Return the frame rate of Blender's float: a whole number by a factor such as 1.001, or the nearest fraction."""
-    whole = round(number * 1.0005)
-    return whole / Fraction(whole / number).limit_denominator(1000) if whole else Fraction(number)
+    """Return the frame rate of Blender's float: a whole number, such a number · 1000/1001, or the nearest fraction."""
+    for rate in (Fraction(round(number)), Fraction(round(number * 1.001) * 1000, 1001)):
+        if rate and abs(float(rate) / number - 1) <= _FLOAT_ERROR:
+            return rate
+    return Fraction(number).limit_denominator(1000) or Fraction(1, 1000)
 
 
 def lend(command: list[str] | None) -> None:

@@ -95,6 +95,10 @@ class MovieSource(FrameSource):
     def read(self, index: int) -> np.ndarray:
         return as_rgba(self.decoded(index))
 
+    def _picture(self, index: int, frame: av.VideoFrame) -> np.ndarray:
+        with self._named(index):
+            return self._pixels(frame)
+
     def decoded(self, index: int) -> Decoded:
         """Return the frame, or its planes in the decoder's memory if they are 8-bit 4:2:0 in BT.601 or 709.
 
@@ -105,7 +109,7 @@ class MovieSource(FrameSource):
             if (to_rgb := self._matrix(frame)) is None:
                 return self._pixels(frame)
             luma, cb, cr = map(_samples_of, frame.planes)
-            return Planes(luma=luma, chroma=(cb, cr), matrix=to_rgb, rgba=partial(self._pixels, frame))
+            return Planes(luma=luma, chroma=(cb, cr), matrix=to_rgb, rgba=partial(self._picture, index, frame))
 
     def grey(self, index: int) -> np.ndarray | None:
         """Return the frame's luma (height, width, 1) if it is the luminance of its colors, else None."""

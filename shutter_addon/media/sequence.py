@@ -275,7 +275,7 @@ def _first_colours(image: ImageInput, path: Path) -> Layer:
             if (spec.width, spec.height) != (whole.width, whole.height):
                 raise MediaError(f"{path.name}: its parts have different data windows")
             return spec, layer
-        names += spec.channelnames
+        names += [f"deep {name}" for name in spec.channelnames] if spec.deep else spec.channelnames
     raise MediaError(f"{path.name}: no colour channels, only {', '.join(names)}")
 
 

@@ -26,6 +26,14 @@ def test_what_is_drawn_is_covered_and_goes_straight_in_between():
     assert np.abs(outlines.coverage(found, *SIZE) - outlines.coverage(between, *SIZE)).mean() < 0.002
 
 
+def test_what_stays_is_itself_where_another_curve_goes():
+    """The larger one leaves the picture and comes back; what lies far away is another one."""
+    gone, stays = circle(0.2, 0.5, 0.15), circle(0.8, 0.5, 0.05)
+    first, second, third = outlines.in_order([[gone, stays], [stays], [gone, stays]], ASPECT)
+    for found in (scribbles.between_strokes(first, second, 0.5, ASPECT), scribbles.between_strokes(second, third, 0.5)):
+        assert np.abs(np.mean(found[0], axis=0) - (0.8, 0.5)).max() < 0.01
+
+
 @pytest.mark.parametrize("drawn", [[], [[]], [[[(0.1, 0.1), (0.5, 0.5)]]]])
 def test_nothing_is_no_curve(drawn):
     assert not any(outlines.in_order(drawn, ASPECT))

@@ -142,7 +142,7 @@ def test_hostile_files_are_pictures_or_one_sentence_and_all_else_goes_on(movies,
 
 
 def test_frame_rates_are_those_of_films():
-    odd = Fraction(25, 2), Fraction(100, 7), Fraction(2997, 50)
+    odd = Fraction(25, 2), Fraction(100, 7), Fraction(2997, 50), Fraction(1667, 100), Fraction(1, 10)
     for rate in (25, 24, Fraction(30000, 1001), Fraction(24000, 1001), Fraction(120000, 1001), *odd):
         assert frame_rate(float(np.float32(rate))) == rate
 

@@ -21,7 +21,7 @@ from ...media.sequence import by_number
 from . import external_files
 from .struct_dna import LayoutError, read, record
 
-_KEPT = 256
+_KEPT = 512
 _TIMES = (
     *("name", "content_start", "content_end", "content_trim_start", "content_trim_end", "left_handle"),
     *("use_reverse_frames", "strobe"),

@@ -14,7 +14,7 @@ from ..data import selection, strips
 from ..devices import main_thread
 from ..editing import baked_strips
 from ..output import baked_film, film_output
-from .operator_bases import operator, redraw
+from .operator_bases import Named, operator, redraw
 from .panel_parts import sentence
 
 TICK = 0.5  # seconds between two looks at the job
@@ -67,14 +67,19 @@ def bake(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] |
     return {"CANCELLED"}  # nothing to undo yet
 
 
-def _why_not_baking(_effect: PropertyGroup) -> str | None:
-    return None if _bake.running else rpt_("No effect is being baked")
-
-
-@operator("Stop Baking", _why_not_baking, options={"REGISTER"})
-def bake_stop(_self: Operator, _context: Context, _effect: PropertyGroup) -> None:
+class SHUTTER_OT_bake_stop(Named, Operator):
     """Stop the bake. Finished frames are kept, and the next bake continues from there"""
-    stop()
+
+    bl_label = "Stop Baking"
+
+    @classmethod
+    def refusal(cls, _context: Context) -> str | None:
+        return None if _bake.running else rpt_("No effect is being baked")
+
+    def execute(self, context: Context) -> set[str]:
+        stop()
+        redraw(context)
+        return {"FINISHED"}
 
 
 def _why_not_baked(_effect: PropertyGroup) -> str | None:

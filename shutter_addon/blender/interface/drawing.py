@@ -134,15 +134,24 @@ def lines(points: ArrayLike, color: Sequence[float], closed: bool = False, width
     gpu.state.blend_set("NONE")
 
 
-def text(x: float, y: float, words: str) -> None:
-    """Draw text with its lower left corner at a point."""
-    blf.size(0, SIZE * ui_scale())
+def text(x: float, y: float, words: str, until: float | None = None) -> None:
+    """Draw text with its lower left corner at a point.
+
+    Args:
+        until: x at which it is cut off.
+    """
+    size = SIZE * ui_scale()
+    blf.size(0, size)
     blf.color(0, 1, 1, 1, 0.9)
     blf.position(0, x, y, 0)
     blf.enable(0, blf.SHADOW)
     blf.shadow(0, 3, 0, 0, 0, 0.8)
+    if until is not None:
+        blf.enable(0, blf.CLIPPING)
+        blf.clipping(0, x, y - size, until, y + 2 * size)
     blf.draw(0, words)
     blf.disable(0, blf.SHADOW)
+    blf.disable(0, blf.CLIPPING)
 
 
 def plated(x: float, y: float, words: str) -> None:

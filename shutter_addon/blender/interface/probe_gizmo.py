@@ -111,7 +111,7 @@ def _draw(
     left = bars[0]
     for i, (bottom, shutter, share) in enumerate(zip(lines, shutters, shares, strict=True)):
         drawing.swatch(left, bottom - unit, 12 * unit, shutter, i)
-        drawing.text(left + 18 * unit, bottom, f"{share:.1%}  {shutter.name}")
+        drawing.text(left + 18 * unit, bottom, f"{share:.1%}  {shutter.name}", until=bars[2])
 
 
 class SHUTTER_GGT_probe(InPreview, GizmoGroup):

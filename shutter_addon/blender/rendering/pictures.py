@@ -33,7 +33,7 @@ def picture(context: RenderContext, snapshot: Snapshot, frame: float, detail: De
     It is scene-linear premultiplied float32, or levels if the context asks for them.
 
     Raises:
-        One of FAULTS: There is none, in one sentence.
+        effect_source.FAULTS: The picture cannot be made.
         StoppedError: It is no longer wanted.
     """
     stopping.check()

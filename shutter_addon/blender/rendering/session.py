@@ -102,7 +102,7 @@ class RenderContext:
             detail: None: as it was the last time, where no picture is made.
 
         Raises:
-            One of FAULTS: It cannot be shown.
+            effect_source.FAULTS: It cannot be shown.
             StoppedError: It is no longer wanted.
         """
         session = self.session
@@ -211,7 +211,7 @@ class RenderSession:
         """Return the renderer of a key. An effect keeps at most two, for plain and smooth pictures.
 
         Raises:
-            One of FAULTS: There is none.
+            effect_source.FAULTS: The picture cannot be made.
         """
         compositor = self._opened(say)
         known = self._renderers.pop(key.place, None)

@@ -103,7 +103,11 @@ _coming: dict[int, _Coming] = {}  # by effect scene
 
 
 def chosen(render: RenderContext, snapshot: Snapshot, frame: float, detail: Detail) -> Request:
-    """Return the smooth request if its picture is ready, else the plain one. One of FAULTS: there is none."""
+    """Return the smooth request if its picture is ready, else the plain one.
+
+    Raises:
+        effect_source.FAULTS: There is no picture.
+    """
     steps, before = known_steps(snapshot), _coming.get(snapshot.scene)
     plain = render.request(snapshot, frame, replace(detail, smooth=False))
     if steps == 1:
@@ -136,7 +140,11 @@ def is_busy() -> bool:
 
 
 def advance(seconds: float) -> None:
-    """Compose the smooth pictures whose plain ones were drawn, for some seconds each. One of FAULTS: there is none."""
+    """Compose the smooth pictures whose plain ones were drawn, for some seconds each.
+
+    Raises:
+        effect_source.FAULTS: There is no picture.
+    """
     for scene, coming in list(_coming.items()):
         if time.monotonic() > coming.since + _UNSEEN:
             coming.rest()

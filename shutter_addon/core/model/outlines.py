@@ -7,13 +7,14 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from .. import scanlines, stopping
-from . import motions, scribbles
+from . import scribbles
 
 # Lines per row of pixels on which coverage is exact.
 LINES = 8
 _CROSSINGS = 1 << 22  # crossings of curves with lines that are computed at once, in about 300 MB of memory
 _PULLED = 12  # the fewest points on either side of a curve that is pulled
 _NEAR = 0.005  # accuracy of distances to curves, in heights of the picture
+_ALIKE = 2.0  # sizes of a curve by which it may move or grow from drawing to drawing
 _POINTS = 256  # of a curve that is paired with others
 
 Curves = tuple[tuple[tuple[float, float], ...], ...]  # hashable strokes: fractions of the picture, y up
@@ -115,17 +116,26 @@ def in_order(drawings: Iterable[Curves], aspect: float) -> list[Curves]:
     Args:
         aspect: The picture's width / height.
     """
-    before: list[np.ndarray] = []
-    result = []
-    for drawing in drawings:
-        left = [_resampled(_turned(np.asarray(curve, np.float64)), aspect) for curve in drawing if len(curve) > 2]
-        ordered = []
-        for curve in before[: len(left)]:
-            apart = [np.abs(motions.corners([curve]) - motions.corners([other])).max() for other in left]
-            ordered.append(_aligned(curve, left.pop(int(np.argmin(apart))), aspect))
-        before = ordered + left
-        result.append(curves(before))
-    return result
+    chains: list[dict[int, np.ndarray]] = []  # a curve by the numbers of its drawings
+    count = 0
+    for count, drawing in enumerate(drawings, 1):
+        left = dict(
+            enumerate(_resampled(_turned(np.asarray(each, float)), aspect) for each in drawing if len(each) > 2)
+        )
+        going = {i: chain[count - 1] for i, chain in enumerate(chains) if count - 1 in chain}
+        for apart, i, j in sorted((_differ(a, b), i, j) for i, a in going.items() for j, b in left.items()):
+            if apart <= _ALIKE and count not in chains[i] and j in left:
+                chains[i][count] = _aligned(going[i], left.pop(j), aspect)
+        chains += [{count: curve} for curve in left.values()]
+    chains.sort(key=len, reverse=True)  # what stays keeps its position
+    return [curves([chain[number] for chain in chains if number in chain]) for number in range(1, count + 1)]
+
+
+def _differ(curve: np.ndarray, other: np.ndarray) -> float:
+    """Return how far two curves' bounding boxes are apart, in parts of the larger one's sides."""
+    boxes = np.array([(points.min(axis=0), points.max(axis=0)) for points in (curve, other)])
+    sides = float(np.ptp(boxes, axis=1).max())
+    return float(np.abs(boxes[0] - boxes[1]).max()) / max(sides, 1e-9)
 
 
 def _resampled(curve: np.ndarray, aspect: float) -> np.ndarray:

@@ -99,7 +99,7 @@ def _check_drawn(region: Any, place: str) -> int:
     if not drawn:
         return 0
     shapes = [strokes for name in ("drawings", "outlines") for _, strokes, _ in drawn.get(name, ())]
-    _require(shapes and shapes[0], f"{place}.strokes", "empty: nothing is drawn")
+    _require(any(shapes) if len(drawn) > 1 else shapes and shapes[0], f"{place}.strokes", "empty: nothing is drawn")
     every = [each for drawings in drawn.values() for each in drawings]
     if len(drawn) > 1 or any(key.strokes is not None for key in region.keys):
         for frame, *_ in every:
