@@ -135,7 +135,7 @@ def stop() -> None:
 
 
 def forget() -> None:
-    """Stop and forget errors, before another file is loaded or the extension is disabled."""
+    """Stop and forget errors, before another file is loaded."""
     stop()
     _bake.failure = "", ""
 
@@ -176,3 +176,6 @@ def _ask_whether_stale() -> None:
     if (active := selection.active(bpy.context)) is not None:
         baked_strips.is_stale(*active)
         redraw(bpy.context)
+
+
+unregister = forget

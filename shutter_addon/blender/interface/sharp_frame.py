@@ -82,7 +82,7 @@ def give_back(context: Context) -> None:
 
 
 def forget() -> None:
-    """Forget the pen before another file is loaded or the extension is disabled."""
+    """Forget the pen before another file is loaded."""
     give_back(bpy.context)
     _pen.tool = ""
 
@@ -157,3 +157,4 @@ register = listen
 
 def unregister() -> None:
     bpy.msgbus.clear_by_owner(_OWNER)
+    give_back(bpy.context)
