@@ -225,8 +225,8 @@ def test_what_is_known_of_files_is_bounded(edit, asked):
         return len(asked)
 
     ends, all_files = 2, 2 + len(source.elements)
-    assert {asks(number) for number in range(300)} == {all_files}
-    assert [asks(number) for number in (299, 200, 0)] == [ends, ends, all_files]
+    assert {asks(number) for number in range(600)} == {all_files}
+    assert [asks(number) for number in (599, 400, 0)] == [ends, ends, all_files]
 
 
 @pytest.mark.usefixtures("on_numpy")
