@@ -3,8 +3,8 @@
 Whatever a pair of frames needs is found when its first moment is read, which the thread that decodes ahead does
 (prefetch). No moment is kept on disk, but vectors may be (derived.StoredVectors).
 
-And how far what footage shows moves from frame to frame: whether an exposure over several of them streaks, or shows
-copies of what moves side by side.
+It also measures how far footage moves from frame to frame, which tells whether an exposure over several frames streaks
+or shows copies side by side.
 """
 
 from __future__ import annotations
