@@ -62,7 +62,9 @@ def with_keys(effect: Effect, shown: range, contents: Iterable[FileContent | Ram
         EffectError: The effect cannot be rendered.
     """
     options = effect.options.at(shown.start)
-    names = _different(shutter.name for shutter in effect.shutters)
+    names: list[str] = []
+    for shutter in effect.shutters:
+        names.append(_free(shutter.name, names))  # regions refer to the first of repeated names
     called, words = _region_names(effect), iter(contents)
     made = [_region(region, name, words, shown) for region, name in zip(effect.regions, called, strict=True)]
     camera = Camera(moves=_moves(effect.camera, {}, shown), **_said(effect.camera, shown))
@@ -81,14 +83,6 @@ def with_keys(effect: Effect, shown: range, contents: Iterable[FileContent | Ram
         **_said(effect, shown),
     )
     return recipe_file.parse(recipe_file.dump(sampled))
-
-
-def _different(names: Iterable[str]) -> list[str]:
-    """Number repeated names: regions refer to the first."""
-    result: list[str] = []
-    for name in names:
-        result.append(_free(name, result))
-    return result
 
 
 def _free(name: str, taken: Collection[str]) -> str:
