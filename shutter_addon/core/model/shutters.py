@@ -21,8 +21,6 @@ from .limits import MAX_BAR, MIN_EXPOSURE
 
 MAX_WINDOW = 256
 
-# Levels of z closer than this are equal: far below any visible weight, but above float rounding.
-_SAME = 1e-12
 # As a fraction of the exposure: interpolation of bars may leave this much in a closed bar by rounding.
 _CLOSED = 1e-9
 _SEEN = 1 / 255  # of the largest bar: less light in other moments is invisible
@@ -92,10 +90,14 @@ def knots(shutters: ArrayLike) -> Quantile:
     """
     parts = [quantile(bars) for bars in np.atleast_2d(shutters)]
     levels = np.unique(np.concatenate([part.z for part in parts]))
-    levels = levels[np.concatenate([[True], np.diff(levels) > _SAME])]
+    # Closer levels are equal: the difference is far below any visible weight, but above float rounding.
+    levels = levels[np.concatenate([[True], np.diff(levels) > 1e-12])]
     levels[-1] = 1.0
     start, end = (np.stack(side, axis=1) for side in zip(*(_on_levels(p, levels) for p in parts), strict=True))
-    keep = _bends(levels, start, end)
+    slope = (end - start) / np.diff(levels)[:, None]
+    jumps = np.abs(start[1:] - end[:-1]) > 1e-9
+    turns = np.abs(np.diff(slope, axis=0)) > 1e-9 * (slope[1:] + slope[:-1])
+    keep = (jumps | turns).any(axis=1)  # the inner levels
     return Quantile(
         np.concatenate([[0.0], levels[1:-1][keep], [1.0]]),
         start[np.concatenate([[True], keep])],
@@ -112,14 +114,6 @@ def _on_levels(part: Quantile, levels: np.ndarray) -> tuple[np.ndarray, np.ndarr
     start = part.start[piece] + (levels[:-1] - z0) * slope
     end = part.end[piece] - (z1 - levels[1:]) * slope
     return np.clip(start, part.start[piece], part.end[piece]), np.clip(end, part.start[piece], part.end[piece])
-
-
-def _bends(levels: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Return at which inner levels any shutter jumps or changes its slope: bool (K - 1,)."""
-    slope = (end - start) / np.diff(levels)[:, None]
-    jumps = np.abs(start[1:] - end[:-1]) > 1e-9
-    turns = np.abs(np.diff(slope, axis=0)) > 1e-9 * (slope[1:] + slope[:-1])
-    return (jumps | turns).any(axis=1)
 
 
 def weights(start: np.ndarray, end: np.ndarray, dz: np.ndarray, window: int) -> np.ndarray:
