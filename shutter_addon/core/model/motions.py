@@ -163,7 +163,10 @@ def thinned(
     if len(frames) < 3:
         return frames
     numbers = as_array([placements[frame] for frame in frames])
-    far = _farthest(np.asarray(points, dtype=np.float64) * size)
+    scaled = np.asarray(points, dtype=np.float64) * size
+    far = scaled[:, 0] + 1j * scaled[:, 1]
+    if len(far) > len(_DIRECTIONS):  # no point moves more than those that are farthest in some direction
+        far = far[np.unique((far[:, None] * _DIRECTIONS.conj()).real.argmax(axis=0))]
     ends = [i for i, frame in enumerate(frames) if frame in kept or i in (0, len(frames) - 1)]
     chosen, spans = set(ends), list(pairwise(ends))
     while spans:
@@ -187,17 +190,6 @@ def as_array(placements: Sequence[Placement]) -> np.ndarray:
 def _placement(numbers: np.ndarray) -> Placement:
     x, y, rotation, scale = numbers.tolist()
     return Placement((x, y), rotation, scale)
-
-
-def _farthest(points: np.ndarray) -> np.ndarray:
-    """Return those of the points (n, 2) that are farthest in some direction, as complex numbers.
-
-    No other point moves more when the shape's placement changes.
-    """
-    plane = points[:, 0] + 1j * points[:, 1]
-    if len(plane) <= len(_DIRECTIONS):
-        return plane
-    return plane[np.unique((plane[:, None] * _DIRECTIONS.conj()).real.argmax(axis=0))]
 
 
 def _distances(frames: np.ndarray, numbers: np.ndarray, points: np.ndarray, size: Size) -> np.ndarray:
