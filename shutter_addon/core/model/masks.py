@@ -149,16 +149,12 @@ def _positions(spline: MaskSpline, count: int, steps: int) -> tuple[np.ndarray, 
     return (segment, u) if spline.cyclic else (np.append(segment, segments - 1), np.append(u, 1.0))
 
 
-def _bezier(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray, u: np.ndarray) -> np.ndarray:
-    u = u[:, None]
-    v = 1 - u
-    return v * v * v * a + 3 * u * v * v * b + 3 * u * u * v * c + u * u * u * d
-
-
 def _at(spline: MaskSpline, points: np.ndarray, segment: np.ndarray, u: np.ndarray) -> np.ndarray:
     """Return points (n, 2) of a spline; beyond the end of an open one, its last point."""
     this, following = points[segment % len(points)], points[(segment + 1) % len(points)]
-    inside = _bezier(this[:, 1], this[:, 2], following[:, 0], following[:, 1], u)
+    a, b, c, d = this[:, 1], this[:, 2], following[:, 0], following[:, 1]
+    u, v = u[:, None], 1 - u[:, None]
+    inside = v * v * v * a + 3 * u * v * v * b + 3 * u * u * v * c + u * u * u * d
     return inside if spline.cyclic else np.where((segment == len(points) - 1)[:, None], points[-1, 1], inside)
 
 
