@@ -168,7 +168,11 @@ class GLDevice(Device):
         for unit, (name, image) in enumerate(program.images.items()):
             images[name].bind_to_image(unit, read=image.reads, write=image.writes)
         for unit, name in enumerate(program.blocks):
-            self._block(unit, blocks[name])
+            buffer = self._blocks.get(unit)
+            if buffer is None or buffer.size < blocks[name].nbytes:
+                buffer = self._blocks[unit] = self._context.buffer(reserve=blocks[name].nbytes)
+            buffer.write(blocks[name])
+            buffer.bind_to_uniform_block(unit)
         for name, value in constants.items():
             if name in used:  # the compiler removes unused constants
                 used[name].value = value
@@ -179,13 +183,6 @@ class GLDevice(Device):
         else:
             shader.run(*groups)
         self._context.memory_barrier()
-
-    def _block(self, unit: int, values: np.ndarray) -> None:
-        buffer = self._blocks.get(unit)
-        if buffer is None or buffer.size < values.nbytes:
-            buffer = self._blocks[unit] = self._context.buffer(reserve=values.nbytes)
-        buffer.write(values)
-        buffer.bind_to_uniform_block(unit)
 
     def finish(self) -> None:
         """Wait until all passes are done. On EGL, other Python threads run meanwhile."""
