@@ -13,7 +13,6 @@ from pathlib import Path
 
 MOST = 100  # lines
 _PACKAGE = Path(__file__).parents[1]
-_CALLS = 8  # of a traceback
 _start = time.monotonic()
 _lines: list[tuple[str, float]] = []  # with seconds since the start, replaced as a whole: any thread adds to them
 
@@ -32,7 +31,7 @@ def exception(error: BaseException) -> None:
     """Keep an unexpected error of the extension: its type and the extension's calls, but not its message."""
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if _is_ours(frame.filename)]
     if frames:
-        calls = [f"{_place(frame.filename, frame.lineno)} {frame.name}" for frame in reversed(frames[-_CALLS:])]
+        calls = [f"{_place(frame.filename, frame.lineno)} {frame.name}" for frame in reversed(frames[-8:])]
         _keep(f"{type(error).__name__} [{' < '.join(calls)}]")
 
 

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 REC709 = np.array([0.2126, 0.7152, 0.0722], np.float32)  # luminance of linear light
-TRACE = 1e-6  # alpha up to this is rounding and counts as transparent
 
 
 def to_linear(encoded: ArrayLike) -> np.ndarray:
@@ -57,4 +56,4 @@ def linearised(rgba: np.ndarray) -> np.ndarray:
 
 def _cover(rgba: np.ndarray) -> np.ndarray:
     alpha = rgba[..., 3:]
-    return np.where(alpha > TRACE, alpha, 1)
+    return np.where(alpha > 1e-6, alpha, 1)  # a smaller alpha is rounding and counts as transparent

@@ -7,9 +7,6 @@ from itertools import pairwise
 
 import numpy as np
 
-# eSeqRetimingKeyFlag: the key begins a smooth transition between two speeds.
-_TRANSITION_IN = 1 << 0
-
 
 @dataclass(frozen=True)
 class RetimingKey:
@@ -93,7 +90,8 @@ def retimed(keys: Sequence[RetimingKey], position: float | np.float32) -> np.flo
     k = max((i for i, key in enumerate(keys[:-1]) if key.index <= position), default=0)
     first, second = keys[k], keys[k + 1]
     speed = _speed(first, second)
-    if first.flag & _TRANSITION_IN and 0 < k < len(keys) - 2:
+    # The first flag of eSeqRetimingKeyFlag: the key begins a smooth transition between two speeds.
+    if first.flag & 1 and 0 < k < len(keys) - 2:
         speed, speed_out = _speed(keys[k - 1], first), _speed(second, keys[k + 2])
         if abs(speed - speed_out) * np.float32(keys[-1].index) >= 0.01:
             return min(np.float32(1), _arc(first, speed, second, speed_out, position))

@@ -25,7 +25,6 @@ from .keyframes import Bars, Channel
 from .motions import Placement
 from .scribbles import Drawings as Drawings
 
-Length = Literal["frames", "timeline", "motion"]
 _CLOSED = 'shutter "{name}" at frame {frame}: {fault}'
 OTHER_MOMENTS = (
     'shutter "{name}": bars {first} to {last} of the older file are one filmed frame now, and expose other moments'
@@ -327,7 +326,7 @@ class Shutter:
         soft_most=24,
         told=False,
     )
-    length: Length = choice(
+    length: Literal["frames", "timeline", "motion"] = choice(
         "Exposure Length", "What sets the length of the exposure", LENGTHS, default="frames", context=CONTEXT, recipe=""
     )
     trail: Channel = number(

@@ -12,7 +12,6 @@ from . import scribbles
 # Lines per row of pixels on which coverage is exact.
 LINES = 8
 _CROSSINGS = 1 << 22  # crossings of curves with lines that are computed at once, in about 300 MB of memory
-_PULLED = 12  # the fewest points on either side of a curve that is pulled
 _NEAR = 0.005  # accuracy of distances to curves, in heights of the picture
 _ALIKE = 2.0  # sizes of a curve by which it may move or grow from drawing to drawing
 _POINTS = 256  # of a curve that is paired with others
@@ -84,7 +83,7 @@ def dragged(
         grabbed, by: Fractions of the picture, y up.
         reach: Heights of the picture, along the curve.
     """
-    points, own = _finer(shapes[index], aspect, reach / _PULLED)
+    points, own = _finer(shapes[index], aspect, reach / 12)  # at least 12 points on either side are pulled
     start = int(_apart(points, grabbed, aspect).argmin())
     points, own = np.roll(points, -start, axis=0), np.roll(own, -start)
     steps = np.hypot(*(np.diff(points, axis=0, append=points[:1]) * (aspect, 1)).T)

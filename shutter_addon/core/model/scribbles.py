@@ -19,10 +19,6 @@ from . import keyframes, limits, motions
 from .keyframes import Channel
 from .motions import Placement
 
-# The smallest radius of a line in pixels: a 5-point diffusion would leak through a thinner one.
-_MIN_RADIUS = 0.7072
-# Long segments are cut to this many pixels, so that the box around each stays small.
-_MAX_SEGMENT = 128.0
 # In pixels, far beyond the limits of limits.py: float64 cannot locate a line's crossing with the picture from there on.
 _FARTHEST = 1e12
 FREE = 0
@@ -191,13 +187,14 @@ def rasterise(shapes: Iterable[Shape], width: int, height: int, *, border: bool 
 
 def _draw(labels: np.ndarray, points: np.ndarray, radius: float, label: int) -> None:
     """Label the pixels within `radius` of a polyline in pixels, y down."""
-    radius = max(radius, _MIN_RADIUS)
+    radius = max(radius, 0.7072)  # pixels: a 5-point diffusion would leak through a thinner line
     if len(points) == 1:
         points = np.repeat(points, 2, axis=0)
     seen = _seen(points[:-1], np.diff(points, axis=0), np.array(labels.shape[::-1]), radius + 1)
     for k in np.flatnonzero(seen[0] <= seen[1]):
         a, b = points[k : k + 2]
-        pieces = max(1, int(np.ceil(np.hypot(*(b - a)) / max(_MAX_SEGMENT, 4 * radius))))
+        # Cut long segments to 128 pixels, so that the box around each stays small.
+        pieces = max(1, int(np.ceil(np.hypot(*(b - a)) / max(128.0, 4 * radius))))
         first, last = max(int(seen[0, k] * pieces) - 1, 0), min(int(seen[1, k] * pieces) + 2, pieces)
         shares = np.arange(first, last + 1) * (1 / pieces)
         ends = a + (b - a) * np.where(np.arange(first, last + 1) == pieces, 1.0, shares)[:, None]

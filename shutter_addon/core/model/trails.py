@@ -20,8 +20,6 @@ from .clip import Clip, Shown
 from .effect import Effect
 from .frame_state import FrameState, Options
 
-# Frames that the shortest trail lasts.
-_SHORTEST = 1e-3
 # Frames: shorter spans of the timeline expose a single frame.
 _INSTANT = 1e-6
 # Fraction of the exposure that the window has to contain.
@@ -87,7 +85,7 @@ def with_length(bars: np.ndarray, way: np.ndarray, length: float, shown: float) 
     moved = np.maximum.accumulate(moved)  # avoids a decrease from rounding
     # Reversed, so that the smallest of the widths without added motion counts: a trail of length 0 is a still frame.
     width = float(np.interp(-length, -moved[::-1], widths[::-1]) if length <= moved[-1] else len(bars))
-    width = max(width, _SHORTEST)
+    width = max(width, 1e-3)  # frames that the shortest trail lasts
     start = float(starts(width))
     return shutters.spanning(bars, start, start + width)
 

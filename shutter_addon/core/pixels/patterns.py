@@ -8,8 +8,6 @@ COUNT = 8  # plain, rising lines, dots, falling lines, horizontal, vertical, hat
 STRENGTH = 0.4  # opacity of the ink over a shutter's colour
 _PERIOD, _SLANTED, _WIDTH, _RADIUS = 8.0, 12.0, 1.7, 1.8  # in units of the interface
 _OFF = 0.3  # keeps pixels' middles off the lines' edges, where rounding would decide
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-_DARK = 0.35  # code value below which a colour gets white ink
 
 
 def marks(index: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -26,7 +24,8 @@ def marks(index: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 def ink(color: Sequence[float]) -> tuple[float, float, float]:
     """Return the ink's colour on a colour (3,), both display code values."""
-    return (1.0, 1.0, 1.0) if np.dot(color, _LUMINANCE) < _DARK else (0.0, 0.0, 0.0)
+    luminance = np.dot(color, [0.2126, 0.7152, 0.0722])
+    return (1.0, 1.0, 1.0) if luminance < 0.35 else (0.0, 0.0, 0.0)
 
 
 def painted(color: Sequence[float], index: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:

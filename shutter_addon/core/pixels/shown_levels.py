@@ -7,7 +7,6 @@ from functools import lru_cache
 import numpy as np
 
 _HASH = np.uint32(1103515245)
-_SPREAD = np.float32(0.0033)  # Blender's dither at intensity 1, in code values
 
 
 @dataclass(frozen=True)
@@ -45,7 +44,7 @@ def _noise(width: int, height: int, dither: float) -> np.ndarray:
     across, up = _HASH * ((x >> 1) ^ y), _HASH * ((y >> 1) ^ x)
     even = (_HASH * (across ^ (up >> 3))).astype(np.float32) * np.float32(2**-31) - 1
     triangle = np.sign(even) * (1 - np.sqrt(1 - np.abs(even)))
-    return triangle * _SPREAD * np.float32(dither)
+    return triangle * np.float32(0.0033) * np.float32(dither)  # code values, as in Blender
 
 
 def rounded(values: np.ndarray) -> np.ndarray:

@@ -23,9 +23,6 @@ from .recipe_check import cut, plain, shown
 if TYPE_CHECKING:
     from cattrs import Converter
 
-# Longer numbers are read as floats, since parsing huge integers takes long. No count needs as many digits.
-_MAX_DIGITS = 300
-
 
 def load(path: str | Path) -> model.Effect:
     """Read the recipe in a JSON file. RecipeError: it cannot be read, or breaks the format."""
@@ -111,7 +108,8 @@ def _object(pairs: list) -> dict:
 
 
 def _whole(digits: str) -> int | float:
-    return int(digits) if len(digits) <= _MAX_DIGITS else float(digits)
+    # Longer numbers are read as floats, since parsing huge integers takes long. No count needs as many digits.
+    return int(digits) if len(digits) <= 300 else float(digits)
 
 
 def _number(value: Any, _kind: Any) -> float:

@@ -55,9 +55,6 @@ class ValueKey:
     ease: Ease = "linear"
 
 
-Keyable = float | list[ValueKey]
-
-
 @cache
 def _keys(least: float, most: float, fewest: int = 0) -> Any:
     """Return the type of a list of keys whose values are in a range."""
@@ -233,7 +230,7 @@ def _values(kind: type, record: Any) -> dict[str, Any]:
     return {name: _channel(value) if each.is_channel else value for name, (each, value) in said.items()}
 
 
-def _channel(value: Keyable) -> Channel:
+def _channel(value: float | list[ValueKey]) -> Channel:
     return Keys(*_columns(value, "frame", "value", "ease")) if isinstance(value, list) else Constant(value)
 
 
