@@ -22,10 +22,6 @@ from ..core import stopping
 from .passes import Pass
 
 MEGABYTE = 1 << 20
-# The share of a GPU's memory that textures may take. Blender, the screen and the driver need the rest.
-GPU_SHARE = 0.75
-# The largest share of the machine's memory, which software renderers and many GPUs use.
-MACHINE_SHARE = 0.5
 # Bytes that textures may take on a GPU that does not tell its memory.
 UNKNOWN = 6 << 30
 # Formats that can move to the host. Frames do not move: a window that does not fit stays on the host as a whole.
@@ -78,9 +74,10 @@ def allowed(memory: int | None) -> int:
     Args:
         memory: the GPU's bytes. None: unknown.
     """
-    limits = [UNKNOWN if memory is None else int(memory * GPU_SHARE)]
-    if (machine := machine_memory()) is not None:
-        limits.append(int(machine * MACHINE_SHARE))
+    # Blender, the screen and the driver need the rest of the GPU's memory.
+    limits = [UNKNOWN if memory is None else int(memory * 0.75)]
+    if (machine := machine_memory()) is not None:  # software renderers and many GPUs use it
+        limits.append(int(machine * 0.5))
     return min(limits)
 
 
