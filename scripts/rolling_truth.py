@@ -20,9 +20,11 @@ from truth import place, stage
 from gallery import stills
 from shutter_addon import blender
 from shutter_addon.blender.data import selection
-from shutter_addon.blender.editing import add_effect, rolling_shutter, shutter_edits
+from shutter_addon.blender.editing import add_effect, shutter_edits
 from shutter_addon.blender.output import matte_export
-from shutter_addon.media import MediaError, open_source, readout
+from shutter_addon.features.rolling_shutter import readout
+from shutter_addon.features.rolling_shutter.blender import rolling_shutter_repair as rolling_shutter
+from shutter_addon.media import MediaError, open_source
 
 COUNT, SHOWN = 22, (8, 11, 15)  # frames of the footage, and those that are compared, from 0
 ROW = 0.02  # of the shutter's time, that a row is exposed

@@ -11,9 +11,9 @@ import numpy as np
 from support import write_frames
 
 from shutter_addon.blender.data import matte_content, recipe_import, strips
-from shutter_addon.blender.editing import add_effect, baked_strips
-from shutter_addon.blender.output import baked_film
+from shutter_addon.blender.editing import add_effect
 from shutter_addon.core.recipes import recipe_file
+from shutter_addon.features.bake.blender import baked_film, baked_strips
 from shutter_addon.media.image_writing import write_exr
 
 WIDTH, HEIGHT, COUNT = 64, 36, 12

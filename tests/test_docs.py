@@ -110,7 +110,7 @@ def test_pages_for_editors_have_the_labels_of_the_interface(name):
 
 
 def test_the_page_of_the_command_has_its_options():
-    files = (ROOT / "shutter_addon" / "blender" / "commands").glob("*.py")
+    files = (ROOT / "shutter_addon").rglob("*command*.py")
     options = {word for file in files for word in re.findall(r'"(--[a-z-]+)"', file.read_text(encoding="utf-8"))}
     page = recipe_table.COMMAND.read_text(encoding="utf-8")
     hidden = {"--attached"}  # for a bake that the window starts

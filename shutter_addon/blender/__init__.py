@@ -7,13 +7,15 @@ from types import ModuleType
 
 import bpy
 
+from .. import features
 from . import interface
 
 # The classes of each are registered (classes_of), then its `register` is called.
 _DATA = "data.preferences", "data.properties", "data.movie_decoding"
 _INTERFACE = [f"interface.{module.name}" for module in iter_modules(interface.__path__)]
-_MODULES = "devices.main_thread", *_DATA, "rendering.engine", *_INTERFACE, "handlers"
+_MODULES = "devices.main_thread", *_DATA, "rendering.engine", *_INTERFACE
 _modules = [import_module(f".{name}", __package__) for name in _MODULES]
+_modules += [*features.modules(), import_module(".handlers", __package__)]
 
 
 def classes_of(module: ModuleType) -> tuple[type, ...]:

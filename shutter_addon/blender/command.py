@@ -1,7 +1,7 @@
 """The command line: `python -m shutter_addon render …`, or `blender -c shutter render …` in an installed Blender.
 
-Each command is a module of commands/, with a sentence for `--help`, a function that adds its options, and one that runs
-it.
+Each command is a module of commands/ or of a feature. It has a sentence for `--help`, a function that adds its options,
+and one that runs it.
 """
 
 import argparse
@@ -9,6 +9,7 @@ import traceback
 from importlib import import_module
 from pathlib import Path
 
+from .. import features
 from ..core.messages import UserError
 from ..devices.device import NoDeviceError
 from ..media.files import check_name
@@ -17,7 +18,7 @@ from .rendering import render_job, render_settings
 
 BAD_INPUT = 2
 PLACES = ("output", "save", "json", "source", "edit")  # options to name where an OSError names no file
-COMMANDS = "render", "track", "bake", "check", "join"
+COMMANDS = "render", "track", "check"
 
 
 def main(argv: list[str]) -> int:
@@ -59,8 +60,9 @@ def _refuse(reason: str, code: int = BAD_INPUT) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser("shutter", description="Every pixel its own exposure.")
     commands = parser.add_subparsers(dest="command", required=True)
-    for name in COMMANDS:
-        command = import_module(f".commands.{name}_command", __package__)
+    own = [import_module(f".commands.{name}_command", __package__) for name in COMMANDS]
+    for command in (*own, *(module for module in features.modules() if module.__name__.endswith("_command"))):
+        name = command.__name__.rpartition(".")[2].removesuffix("_command")
         options = commands.add_parser(name, help=command.HELP)
         command.add(options)
         options.set_defaults(run=command.run)

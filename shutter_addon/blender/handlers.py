@@ -12,13 +12,14 @@ import bpy
 from bpy.app.handlers import persistent
 from bpy.types import Depsgraph, Scene
 
+from .. import features
 from ..core import recent_errors, revision
 from ..core.messages import sentence
 from .data import data_format, preview_areas, source_media, strips, versions
 from .devices import main_thread
 from .editing import reconcile as reconciling
 from .editing import shown_annotations, track_region, undelete
-from .interface import bake_operators, operator_bases, sharp_frame
+from .interface import operator_bases, sharp_frame
 from .output import edit_feed
 from .rendering import invalidation, job_snapshots, render_job, sessions, strobing
 from .rendering.render_job import Where
@@ -29,7 +30,8 @@ def _forget_file(*_) -> None:
     sharp_frame.forget()
     operator_bases.end_all()
     strobing.forget()
-    bake_operators.forget()
+    for forget in features.each("forget"):
+        forget()
     track_region.data_replaced()
     sessions.forget()
     invalidation.forget()

@@ -11,9 +11,11 @@ from _bl_i18n_utils import bl_extract_messages, settings
 from shutter_addon import blender
 from shutter_addon.core.model import effect, scribbles, shutters
 from shutter_addon.core.model.choices import CONTEXT
-from shutter_addon.media import camera_tracking, matte_tracking, part_tracking, readout, tracking
+from shutter_addon.features.rolling_shutter import readout
+from shutter_addon.media import camera_tracking, matte_tracking, part_tracking, tracking
 
-SOURCES = sorted(Path(blender.__file__).parent.rglob("*.py"))
+ROOT = Path(blender.__file__).parents[1]
+SOURCES = sorted([*ROOT.glob("blender/**/*.py"), *ROOT.glob("features/*/blender/*.py")])
 
 
 def of_classes() -> set:
@@ -70,7 +72,7 @@ def _of_class(cls):
     yield "*", getattr(cls, "bl_category", "")
     if issubclass(cls, bpy.types.Operator):
         yield "*", rna.description
-    ours = [base for base in cls.__mro__ if base.__module__.startswith(blender.__name__)]
+    ours = [base for base in cls.__mro__ if base.__module__.startswith(blender.__package__.partition(".")[0])]
     properties = {prop.identifier: prop for prop in rna.properties}  # a group's own "name" comes after Blender's
     declared = [name for base in ours for name in inspect.get_annotations(base)]
     for prop in (properties[name] for name in declared if name in properties):  # what is none is a plain attribute

@@ -10,11 +10,12 @@ from support import noise_film, picture_of, read_picture, sequencer
 
 from shutter_addon.blender import command
 from shutter_addon.blender.data import selection, strips
-from shutter_addon.blender.editing import baked_strips, reconcile
-from shutter_addon.blender.output import baked_film, film_output
+from shutter_addon.blender.editing import reconcile
+from shutter_addon.blender.output import film_output
 from shutter_addon.blender.rendering import sessions
 from shutter_addon.core import revision
 from shutter_addon.core.frames import light
+from shutter_addon.features.bake.blender import baked_film, baked_strips
 from shutter_addon.media import film_parts
 
 COUNT, SIZE = 9, (24, 40)

@@ -6,11 +6,12 @@ import support
 from support import image_strip, request, started, write_frames
 
 from shutter_addon.blender.data import consistency, recipe_import
-from shutter_addon.blender.editing import rolling_shutter, shutter_edits
+from shutter_addon.blender.editing import shutter_edits
 from shutter_addon.blender.output import matte_export
 from shutter_addon.blender.rendering import sessions
 from shutter_addon.core.model import limits, windows
 from shutter_addon.core.pixels import compositor
+from shutter_addon.features.rolling_shutter.blender import rolling_shutter_repair as rolling_shutter
 
 WIDTH, HEIGHT, COUNT = 160, 120, 16
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from shutter_addon.media import readout
+from shutter_addon.features.rolling_shutter import readout
 
 WIDTH, HEIGHT, COUNT = 320, 240, 14
 POLES = ((40, 9, 0.02), (90, 14, -0.03), (150, 7, 0.0), (215, 12, 0.05), (270, 10, -0.01), (330, 8, 0.0))

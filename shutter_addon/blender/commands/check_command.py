@@ -14,7 +14,7 @@ from ...core.messages import UserError
 from ...devices.device import NoDeviceError
 from ..data import external_files, versions
 from ..devices import available
-from ..output import edit_check, error_report, film_join, film_output, shared_frames
+from ..output import edit_check, error_report, film_output, shared_frames
 from ..rendering import render_job, render_settings
 from . import command_line
 
@@ -95,7 +95,7 @@ def _setting_faults(arguments: Namespace, scene: Scene, frames: range) -> list[s
     if arguments.output:
         faults += _fault(shared_frames.check, arguments.output, arguments.format, frames, read)
     if arguments.movie:
-        faults += _fault(film_join.check, arguments.movie, read)
+        faults += _fault(film_output.check_movie, arguments.movie, read)
     is_movie = arguments.movie or scene.render.image_settings.media_type == "VIDEO"
     film = arguments.movie or Path("film.mp4" if is_movie else "frames")
     return faults or _fault(film_output.check, film, None, film_output.size(scene))

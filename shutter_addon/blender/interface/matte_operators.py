@@ -4,17 +4,16 @@ from pathlib import Path
 
 import bpy
 from bpy.app.translations import contexts
-from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy.types import Context, Mask, Operator, PropertyGroup
 from bpy_extras.io_utils import ImportHelper
 
-from ...core.messages import EffectError, UserError
-from ...core.model.choices import CONTEXT, RAMPS, READS, SIDES
+from ...core.messages import UserError
+from ...core.model.choices import RAMPS
 from ...core.model.limits import MAX_CHANNEL
 from ..data import matte_content, recipe_import, selection, strips
-from ..editing import outline_drawings, region_edits, rolling_shutter, shutter_edits
+from ..editing import outline_drawings, region_edits, shutter_edits
 from ..output import matte_export
 from . import needs
 from .operator_bases import OfEffect, chosen_file, given, kept, operator
@@ -132,61 +131,3 @@ def _why_no_time_map(effect: PropertyGroup) -> str | None:
 def time_map(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Show every pixel at its own moment: a ramp from the first frame to the last (slit-scan)"""
     shutter_edits.add_time_map(effect, self.ramp)
-
-
-def _why_no_repair(effect: PropertyGroup) -> str | None:
-    try:
-        has_repair = rolling_shutter.of(effect) is not None
-    except EffectError as error:
-        return str(error)
-    return None if has_repair else region_edits.why_full(effect, regions=1, shutters=2)
-
-
-class SHUTTER_OT_rolling_shutter(OfEffect, Operator):
-    """Show every row as it was when the middle one was filmed, so that skewed lines become straight"""
-
-    bl_label = "Rolling Shutter Repair"
-    icon = "CAMERA_DATA"
-    choices = "side"
-    needs = (_why_no_repair,)
-
-    side: EnumProperty(
-        name="Read First",
-        description="The side of the picture that the sensor reads first",
-        items=SIDES,
-        translation_context=CONTEXT,
-    )
-    readout: FloatProperty(
-        name="Readout",
-        description="Time from reading the first row to the last, as a percentage of a frame",
-        subtype="PERCENTAGE",
-        default=50.0,
-        min=1.0,
-        max=100.0,
-        options={"SKIP_SAVE"},
-    )
-
-    def change(self, _context: Context, effect: PropertyGroup) -> None:
-        known = rolling_shutter.of(effect)
-        if known is not None and not self.properties.is_property_set("readout"):
-            self.readout = 100 * known.readout  # choosing a side in the menu keeps the readout
-        rolling_shutter.repair(self.edit, effect, self.effect_strip, self.readout / 100, self.side)
-
-
-_READS = EnumProperty(
-    name="Reads",
-    description="Whether the sensor reads row by row or column by column",
-    items=READS,
-    translation_context=CONTEXT,
-)
-
-
-@operator("Find Readout", _why_no_repair, icon="VIEWZOOM", reads=_READS)
-def find_readout(self: Operator, _context: Context, effect: PropertyGroup) -> None:
-    """Find the sensor's readout time from lines that lean while they move around the current frame, and repair it"""
-    found, side = rolling_shutter.find(self.edit, effect, self.effect_strip, columns=self.reads == "COLUMNS")
-    rolling_shutter.repair(self.edit, effect, self.effect_strip, min(abs(found), 1.0), side)
-    name = next(name for word, name, _ in SIDES if word == side)
-    percent = round(100 * abs(found))
-    sentence = rpt_("Readout of {percent} % of a frame, read first: {side}")
-    self.report({"INFO"}, sentence.format(percent=percent, side=iface_(name, CONTEXT)))

@@ -76,7 +76,9 @@ def draw_operators(layout: UILayout, *names: str) -> None:
         if not name:
             layout.separator()
             continue
-        kind = getattr(bpy.types, f"SHUTTER_OT_{name}")
+        kind = getattr(bpy.types, f"SHUTTER_OT_{name}", None)
+        if kind is None:  # of a feature that was removed
+            continue
         if kind.choices and kind.poll(bpy.context):
             layout.operator_menu_enum(f"shutter.{name}", kind.choices, icon=kind.icon)
         else:  # greyed out, its tooltip says why

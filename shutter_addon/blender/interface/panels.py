@@ -14,7 +14,7 @@ from ...core.model.fields import fields_of
 from ..data import annotations, consistency, data_format, selection, strips
 from ..editing import bar_edits, match_source
 from ..rendering import strobing
-from . import bake_operators, region_panels
+from . import region_panels
 from .panel_parts import WIDEST, draw_list, draw_operators, draw_properties, menu, panel, pattern_icon, sentence
 
 
@@ -296,5 +296,4 @@ classes = (
     panel("_move", "Exposure Moves With", _draw_move, selection.active_shutter, "_exposure"),
     panel("_camera", "Camera", region_panels.draw_camera, region_panels.has_camera),
     panel("_options", "Options", _draw_options),
-    panel("_bake", "Bake", bake_operators.draw_panel),
 )

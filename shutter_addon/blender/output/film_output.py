@@ -81,6 +81,14 @@ def check_folder(path: Path, file_format: str | None) -> None:
         raise OutputError(f"{path}: neither a folder nor one of {', '.join(MOVIES)}")
 
 
+def check_movie(output: Path, read: list[Path]) -> None:
+    """Raise OutputError if the movie cannot be there; `read` are files that must not be overwritten."""
+    if not is_movie(output):
+        raise OutputError(f"{output}: none of {', '.join(MOVIES)}")
+    blender_path(str(output))
+    refuse_overwriting([output], read)
+
+
 def check_writable(folder: Path) -> None:
     """Raise OutputError if a folder, or the first existing one above, cannot be written to."""
     place = next(path for path in (folder, *folder.parents) if path.exists())

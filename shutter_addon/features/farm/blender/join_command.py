@@ -2,10 +2,11 @@
 
 from argparse import ArgumentParser, Namespace
 
-from ...core.farm import job_file
-from ..data import external_files, versions
-from ..output import film_join, film_output
-from . import command_line
+from ....blender.commands import command_line
+from ....blender.data import external_files, versions
+from ....blender.output import film_output
+from ....core.farm import job_file
+from . import film_join
 
 HELP = "make a movie of rendered frames, with the edit's sound and settings"
 
@@ -20,7 +21,7 @@ def add(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> None:
     scene, frames = command_line.open_edit(arguments.edit, arguments.frames)
-    film_join.check(arguments.output, [arguments.edit, *versions.read_files(scene)])
+    film_output.check_movie(arguments.output, [arguments.edit, *versions.read_files(scene)])
     for fault in external_files.sound_faults(scene, frames):
         raise film_output.OutputError(fault)  # Blender would make a silent film
     version = versions.of_edit(scene)

@@ -6,23 +6,15 @@ from pathlib import Path
 
 from bpy.types import ImageFormatSettings, Scene
 
-from ...core import threads
-from ...core.frames import frame_ranges
-from ...media import rendered_pictures
-from ...media.rendered_pictures import RenderedPicture
-from ..data import sole_effect, strips
-from . import film_output
-from .film_output import OutputError
+from ....blender.data import sole_effect, strips
+from ....blender.output import film_output
+from ....blender.output.film_output import OutputError
+from ....core import threads
+from ....core.frames import frame_ranges
+from ....media import rendered_pictures
+from ....media.rendered_pictures import RenderedPicture
 
 AT_ONCE = 1000  # pictures per strip: Blender copies all of them for each that is added
-
-
-def check(output: Path, read: list[Path]) -> None:
-    """Raise OutputError if the movie cannot be there; `read` are files that must not be overwritten."""
-    if not film_output.is_movie(output):
-        raise OutputError(f"{output}: none of {', '.join(film_output.MOVIES)}")
-    film_output.blender_path(str(output))
-    film_output.refuse_overwriting([output], read)
 
 
 def join(scene: Scene, folder: Path, output: Path, frames: range, key: str) -> None:

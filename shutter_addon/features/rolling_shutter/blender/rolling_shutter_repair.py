@@ -14,14 +14,15 @@ from bpy.app.translations import pgettext_data as data_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import PropertyGroup, Scene, Strip
 
-from ...core.messages import EffectError
-from ...core.model.frame_state import Options
-from ...media import opencv, readout
-from ...media.cuts import ShotSource
-from ..data import snapshot, source_media, strips, validation
-from ..data.consistency import bars
-from ..data.sampled import Sampling
-from . import bar_edits, region_edits, shutter_edits
+from ....blender.data import snapshot, source_media, strips, validation
+from ....blender.data.consistency import bars
+from ....blender.data.sampled import Sampling
+from ....blender.editing import bar_edits, region_edits, shutter_edits
+from ....core.messages import EffectError
+from ....core.model.frame_state import Options
+from ....media import opencv
+from ....media.cuts import ShotSource
+from .. import readout
 
 SMOOTH = "8"  # for effects that are not smooth
 FRAMES = 3  # least window: the shown frame and those beside it

@@ -8,14 +8,14 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import EnumProperty
 from bpy.types import Context, Operator, PropertyGroup, Scene, Strip, UILayout
 
-from ...core import messages
-from ...core.messages import EffectError, UserError
-from ..data import selection, strips
-from ..devices import main_thread
-from ..editing import baked_strips
-from ..output import baked_film, film_output
-from .operator_bases import Named, operator, redraw
-from .panel_parts import sentence
+from ....blender.data import selection, strips
+from ....blender.devices import main_thread
+from ....blender.interface.operator_bases import Named, operator, redraw
+from ....blender.interface.panel_parts import panel, sentence
+from ....blender.output import film_output
+from ....core import messages
+from ....core.messages import EffectError, UserError
+from . import baked_film, baked_strips
 
 TICK = 0.5  # seconds between two looks at the job
 STILL = 1.0  # seconds before the panel asks again whether the bake is outdated
@@ -178,4 +178,5 @@ def _ask_whether_stale() -> None:
         redraw(bpy.context)
 
 
+classes = (panel("_bake", "Bake", draw_panel),)
 unregister = forget

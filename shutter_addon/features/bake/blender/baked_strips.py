@@ -14,11 +14,11 @@ from bpy.app.translations import pgettext_data as data_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import MetaStrip, PropertyGroup, Scene, SequenceEditor, Strip
 
-from ...core import revision
-from ...core.messages import EffectError
-from ..data import effect_version, fcurves, selection, strips
-from ..output.baked_film import Film
-from . import add_effect, match_source
+from ....blender.data import effect_version, fcurves, selection, strips
+from ....blender.editing import add_effect, match_source
+from ....core import revision
+from ....core.messages import EffectError
+from .baked_film import Film
 
 
 def check(scene: Scene, strip: Strip) -> None:

@@ -11,11 +11,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..core import stopping
-from ..core.frames.frame_source import FrameSource
-from ..core.messages import MediaError
-from . import flow, opencv
-from .opencv import cv2
+from ...core import stopping
+from ...core.frames.frame_source import FrameSource
+from ...core.messages import MediaError
+from ...media import flow, opencv
+from ...media.opencv import cv2
 
 ROWS = 540  # the most rows of the pictures
 FRAMES = 48  # successive frames that tell the readout

@@ -7,11 +7,12 @@ from contextlib import suppress
 
 from bpy.types import PropertyGroup, Scene, Strip
 
-from ...core.messages import sentence
-from ..data import strips
-from ..editing import whole_edits
-from ..output import baked_film, film_output
-from . import command_line
+from ....blender.commands import command_line
+from ....blender.data import strips
+from ....blender.editing import whole_edits
+from ....blender.output import film_output
+from ....core.messages import sentence
+from . import baked_film
 
 HELP = "render one effect of a saved edit, for a strip to show"
 

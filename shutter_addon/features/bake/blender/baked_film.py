@@ -20,17 +20,17 @@ import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import PropertyGroup, Scene, Strip
 
-from ...core import atomic_write, stopping
-from ...core.farm import job_file
-from ...core.messages import EffectError, MediaError, signed
-from ...core.stopping import StoppedError
-from ...media import files, film_parts, image_writing, rendered_pictures
-from ...media.blender_movie import frame_rate
-from ...media.derived import own_folder, refuse_link
-from ...media.rendered_pictures import is_whole_movie, is_whole_picture
-from ..data import effect_version, preferences, snapshot, source_media, strips, versions
-from ..rendering import pictures, sessions
-from . import film_output
+from ....blender.data import effect_version, preferences, snapshot, source_media, strips, versions
+from ....blender.output import film_output
+from ....blender.rendering import pictures, sessions
+from ....core import atomic_write, stopping
+from ....core.farm import job_file
+from ....core.messages import EffectError, MediaError, signed
+from ....core.stopping import StoppedError
+from ....media import files, film_parts, image_writing, rendered_pictures
+from ....media.blender_movie import frame_rate
+from ....media.derived import own_folder, refuse_link
+from ....media.rendered_pictures import is_whole_movie, is_whole_picture
 
 FOLDER = "virtual_shutter_baked"  # beside the .blend file
 Kind = Literal["MOVIE", "OPEN_EXR"]

@@ -1,0 +1,33 @@
+"""Features that Virtual Shutter works without.
+
+Each is a folder: its algorithm, and in the folder `blender` what uses bpy. To remove one, delete its folder and its
+name in FEATURES. Modules in `blender` register as those of the package `blender` do. Commands are named …_command.
+"""
+
+from collections.abc import Iterator
+from functools import cache
+from importlib import import_module
+from pkgutil import iter_modules
+from types import ModuleType
+from typing import Any
+
+FEATURES = (
+    "rolling_shutter",
+    "bake",
+    "farm",
+)
+
+
+@cache
+def modules() -> list[ModuleType]:
+    """Import the modules of all features that use bpy."""
+    found = []
+    for name in FEATURES:
+        folder = import_module(f".{name}.blender", __package__)
+        found += [import_module(f".{module.name}", folder.__name__) for module in iter_modules(folder.__path__)]
+    return found
+
+
+def each(name: str) -> Iterator[Any]:
+    """Yield what has this name in the modules of all features."""
+    return (getattr(module, name) for module in modules() if hasattr(module, name))

@@ -1,0 +1,1 @@
+"""Baking in Blender: the film, its strip, the operators and the command."""

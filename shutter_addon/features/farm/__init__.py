@@ -1,0 +1,1 @@
+"""Films that several machines render."""

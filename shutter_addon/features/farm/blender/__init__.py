@@ -1,0 +1,1 @@
+"""The command that joins frames to a movie."""

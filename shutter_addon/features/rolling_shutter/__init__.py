@@ -1,0 +1,1 @@
+"""Rolling shutters: find the readout of a sensor."""

@@ -1,0 +1,1 @@
+"""Rolling shutters in Blender: repair them with a ramp of moments."""
