@@ -19,7 +19,8 @@ import outline_scenes
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from shutter_addon.core.model import outlines, scribbles
-from shutter_addon.media import carrying, flow, open_source
+from shutter_addon.features.outlines import carrying
+from shutter_addon.media import flow, open_source
 from shutter_addon.media.opening import MatteFile
 
 POINTS = 48

@@ -24,7 +24,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from shutter_addon.core.model.effect import Drawings, Moves, Region
 from shutter_addon.core.model.keyframes import Constant
-from shutter_addon.media import PrefetchSource, open_source, tracking
+from shutter_addon.features.tracking import tracking
+from shutter_addon.media import PrefetchSource, open_source
 from shutter_addon.media.cuts import ShotSource
 from shutter_addon.media.footage import AHEAD, KEPT, Footage
 

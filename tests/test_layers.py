@@ -1,4 +1,7 @@
-"""The layers: core, media and compute never import bpy, and core needs no GL and no media libraries."""
+"""The layers: core, media and compute never import bpy, and core needs no GL and no media libraries.
+
+What features are: shutter_addon/features/__init__.py.
+"""
 
 import ast
 import re
@@ -32,10 +35,10 @@ def imported(path):
 
 BLENDER = {"bpy", "bpy_extras", "gpu", "mathutils", "bl_ui", "addon_utils"}
 FORBIDDEN = {
-    "core": BLENDER | {"moderngl", "av", "OpenImageIO", "media", "devices", "compute", "blender"},
-    "media": BLENDER | {"moderngl", "devices", "compute", "blender"},
-    "devices": BLENDER | {"av", "OpenImageIO", "media", "compute", "blender"},
-    "compute": BLENDER | {"av", "OpenImageIO", "moderngl", "media", "blender"},
+    "core": BLENDER | {"moderngl", "av", "OpenImageIO", "media", "devices", "compute", "blender", "features"},
+    "media": BLENDER | {"moderngl", "devices", "compute", "blender", "features"},
+    "devices": BLENDER | {"av", "OpenImageIO", "media", "compute", "blender", "features"},
+    "compute": BLENDER | {"av", "OpenImageIO", "moderngl", "media", "blender", "features"},
 }
 
 
@@ -85,6 +88,18 @@ def test_rooms_use_those_below_them_alone(layer):
         for path in (PACKAGE / layer / room).rglob("*.py"):
             used = above(path, PACKAGE / layer)
             assert used <= below, f"{room}/{path.name} uses {used - below}"
+
+
+def test_features_stand_alone():
+    """What is outside of them asks for them by name; they use no other one, and bpy only in their folder `blender`."""
+    for path in PACKAGE.rglob("*.py"):
+        if not path.is_relative_to(PACKAGE / "features"):
+            assert not any(re.search(r"\.features\.", name) for name in imported(path)), path
+    for folder in (PACKAGE / "features").glob("*/"):
+        for path in folder.rglob("*.py"):
+            assert above(path, folder.parent) == set(), path
+            if path.parent == folder:
+                assert (imported(path) | above(path, PACKAGE)) & (BLENDER | {"blender"}) == set(), path
 
 
 def test_what_all_rooms_of_core_use_needs_none():

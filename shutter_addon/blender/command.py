@@ -18,7 +18,7 @@ from .rendering import render_job, render_settings
 
 BAD_INPUT = 2
 PLACES = ("output", "save", "json", "source", "edit")  # options to name where an OSError names no file
-COMMANDS = "render", "track", "check"
+COMMANDS = "render", "check"
 
 
 def main(argv: list[str]) -> int:

@@ -15,13 +15,13 @@ from bpy.types import Depsgraph, Scene
 from .. import features
 from ..core import recent_errors, revision
 from ..core.messages import sentence
-from .data import data_format, preview_areas, source_media, strips, versions
+from .data import data_format, preview_areas, source_media, strips, targets, versions
 from .devices import main_thread
 from .editing import reconcile as reconciling
-from .editing import shown_annotations, track_region, undelete
+from .editing import shown_annotations, undelete
 from .interface import operator_bases, sharp_frame
 from .output import edit_feed
-from .rendering import invalidation, job_snapshots, render_job, sessions, strobing
+from .rendering import invalidation, job_snapshots, render_job, sessions
 from .rendering.render_job import Where
 
 
@@ -29,10 +29,9 @@ def _forget_file(*_) -> None:
     edit_feed.end()
     sharp_frame.forget()
     operator_bases.end_all()
-    strobing.forget()
     for forget in features.each("forget"):
         forget()
-    track_region.data_replaced()
+    targets.data_replaced()
     sessions.forget()
     invalidation.forget()
     source_media.look_again()
@@ -93,7 +92,7 @@ def _update(scene: Scene | None = None, depsgraph: Depsgraph | None = None) -> N
 def _after_undo(*_) -> None:
     revision.changed()
     reconciling.find_lost()
-    track_region.data_replaced()
+    targets.data_replaced()
     invalidation.drop_frames()
     sessions.drop_removed()
     sharp_frame.give_back(bpy.context)

@@ -11,7 +11,13 @@ from pkgutil import iter_modules
 from types import ModuleType
 from typing import Any
 
+from ..core.messages import EffectError
+
 FEATURES = (
+    "smooth",
+    "outlines",
+    "masks",
+    "tracking",
     "rolling_shutter",
     "bake",
     "farm",
@@ -20,10 +26,9 @@ FEATURES = (
 
 @cache
 def modules() -> list[ModuleType]:
-    """Import the modules of all features that use bpy."""
+    """Import all modules of the features."""
     found = []
-    for name in FEATURES:
-        folder = import_module(f".{name}.blender", __package__)
+    for folder in [import_module(f".{name}{part}", __package__) for name in FEATURES for part in ("", ".blender")]:
         found += [import_module(f".{module.name}", folder.__name__) for module in iter_modules(folder.__path__)]
     return found
 
@@ -31,3 +36,10 @@ def modules() -> list[ModuleType]:
 def each(name: str) -> Iterator[Any]:
     """Yield what has this name in the modules of all features."""
     return (getattr(module, name) for module in modules() if hasattr(module, name))
+
+
+def needed(name: str) -> Any:
+    """Return what a feature calls `name`. EffectError: the feature was removed."""
+    for found in each(name):
+        return found
+    raise EffectError(f"this Virtual Shutter was built without {name}")

@@ -26,6 +26,7 @@ from .files import check_name
 from .image_writing import write_exr
 
 VECTORS = "virtual_shutter_vectors"  # the folder of StoredVectors
+MATTES = "virtual_shutter_mattes"  # the folder of carried mattes
 WHOLE = 8 << 20  # bytes; files of a source up to this size, such as uncompressed 8-bit HD pictures, are hashed whole
 BLOCKS, BLOCK = 16, 4096  # of a larger file so many blocks, of so many bytes each, are hashed
 _LARGER = 1 << 20  # bytes; a file that is larger than its samples by more holds something else

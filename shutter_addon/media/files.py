@@ -10,6 +10,8 @@ from ..core.messages import MediaError
 PIXELS = 1 << 28  # 16384×16384, FFmpeg's limit; a damaged header may claim any size
 FOREIGN = "an image of a kind that Blender does not read; save it as PNG, TIFF or EXR first"
 
+MODEL = Path(__file__).resolve().parents[2] / "models" / "u2netp.onnx"  # the network that finds subjects
+
 
 @cache
 def pyav_missing() -> str:

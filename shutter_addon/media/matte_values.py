@@ -10,7 +10,6 @@ import numpy as np
 
 from ..core.model.mattes import Content, FileFrame, Matte, MatteFile, MatteSource
 from ..core.pixels.matte_grid import block_means, feathered, fitted
-from .carried_mattes import CarriedMattes
 
 # The most files that stay open.
 MOST_OPEN = 16
@@ -59,9 +58,9 @@ class MatteValues:
         file, late = content.file, self._late
         if file not in self._sources:
             self._sources[file] = file.open()
-        source = self._sources[file]
+        source: Any = self._sources[file]
         frame = min(max(content.index(source, index // self._step), 0), source.count - 1)
-        if late is None or not isinstance(source, CarriedMattes) or source.has(frame):
+        if late is None or not hasattr(source, "straight") or source.has(frame):
             return (file, frame, False), partial(source.read, frame)
 
         def straight() -> np.ndarray:

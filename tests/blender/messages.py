@@ -12,7 +12,7 @@ from shutter_addon import blender
 from shutter_addon.core.model import effect, scribbles, shutters
 from shutter_addon.core.model.choices import CONTEXT
 from shutter_addon.features.rolling_shutter import readout
-from shutter_addon.media import camera_tracking, matte_tracking, part_tracking, tracking
+from shutter_addon.features.tracking import camera_tracking, matte_tracking, part_tracking, tracking
 
 ROOT = Path(blender.__file__).parents[1]
 SOURCES = sorted([*ROOT.glob("blender/**/*.py"), *ROOT.glob("features/*/blender/*.py")])

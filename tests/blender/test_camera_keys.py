@@ -8,10 +8,11 @@ import pytest
 from support import call, image_strip, request, started, write_frames
 
 from shutter_addon.blender.data import annotations, consistency, fcurves, selection, snapshot
-from shutter_addon.blender.editing import region_edits, track_region
+from shutter_addon.blender.editing import region_edits
 from shutter_addon.core.model import motions
 from shutter_addon.core.model.motions import Similarity
-from shutter_addon.media import camera_tracking, registration
+from shutter_addon.features.tracking import camera_tracking, registration
+from shutter_addon.features.tracking.blender import track_region
 
 SIZE = WIDTH, HEIGHT = 240, 160
 COUNT = 12

@@ -17,7 +17,7 @@ from shutter_addon.blender.data import recipe_import, versions
 from shutter_addon.blender.editing import add_effect, shutter_edits
 from shutter_addon.core.farm import job_file
 from shutter_addon.core.recipes import recipe_file
-from shutter_addon.media import carrying
+from shutter_addon.features.outlines import carrying
 from shutter_addon.media.rendered_pictures import read
 
 FRAMES, WINDOW = 8, 4

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from shutter_addon.blender.data import annotations, selection, snapshot
-from shutter_addon.blender.editing import drawn_places, motion_keys, outline_drawings, region_edits
+from shutter_addon.blender.editing import drawn_places, motion_keys, region_edits
 from shutter_addon.core.model import scribbles
 from shutter_addon.core.model.motions import Placement
 
@@ -143,6 +143,6 @@ def test_outlines_stay_as_they_are_drawn(bpy, region):
     drawn_places.begin(effect, strip, 0)
     (curve,) = snapshot.strokes_at(scene, effect, strip, 0, 11)
     assert same([curve * (640, 360) - (320, 180)], FIRST)
-    outline_drawings.draw(effect, strip, region, [curve], 11)
+    region_edits.draw_curves(effect, strip, region, [curve], 11)
     (curve,) = snapshot.strokes_at(scene, effect, strip, 0, 11)
     assert same([curve * (640, 360) - (320, 180)], FIRST)

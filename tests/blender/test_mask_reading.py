@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from support import write_frames
 
-from shutter_addon.blender.data import mask_reading, struct_dna
+from shutter_addon.blender.data import struct_dna
 from shutter_addon.core.messages import EffectError
+from shutter_addon.features.masks.blender import mask_reading
 
 AVERAGE = 0.5  # what a picture may differ by, in 8-bit levels: Blender cuts off fractions
 ASTRAY = 0.001  # share of pixels that may differ by more than 8 levels
@@ -182,7 +183,7 @@ def moving(bpy, edit, mask, mask_editor, clip):
 
 def assert_refused(mask):
     with pytest.raises(EffectError, match='mask "M" moves: use "Outline from Mask", or take a film'):
-        mask_reading.still(mask)
+        mask_reading.still_mask(mask)
 
 
 def test_shape_keys_are_read_and_refused(moving, monkeypatch):
@@ -199,17 +200,17 @@ def test_shape_keys_are_read_and_refused(moving, monkeypatch):
         raise struct_dna.LayoutError
 
     monkeypatch.setattr(mask_reading, "record", elsewhere)
-    assert mask_reading.still(moving).layers[0].splines[0].points[0][1][0] == pytest.approx(0.6)
+    assert mask_reading.still_mask(moving).layers[0].splines[0].points[0][1][0] == pytest.approx(0.6)
 
 
 def test_keyed_opacity_and_parents_are_refused(bpy, mask, mask_editor, clip, edit):
     layer = mask.layers.new(name="L")
     spline, clip = draw(layer, blob(random.Random(2), 5)), clip(40, 30)
-    mask_reading.still(mask)
+    mask_reading.still_mask(mask)
     layer.keyframe_insert("alpha", frame=10)
     assert_refused(mask)
     layer.keyframe_delete("alpha", frame=10)
-    mask_reading.still(mask)
+    mask_reading.still_mask(mask)
     clip.tracking.tracks.active = clip.tracking.tracks.new(name="T", frame=1)
     with mask_editor(clip, mask):
         for point in spline.points:
@@ -224,8 +225,8 @@ def test_numbers_that_are_none_are_refused(bpy, mask, value):
     spline = draw(layer, blob(random.Random(2), 5))
     spline.points[2].co = (value, 0.5)
     with pytest.raises(EffectError, match='mask "M": a point, a feather or an opacity is not a usable number'):
-        mask_reading.still(mask)
+        mask_reading.still_mask(mask)
     spline.points[2].co = (0.5, 0.5)
     layer.alpha = value
     with pytest.raises(EffectError, match="not a usable number"):
-        mask_reading.still(mask)
+        mask_reading.still_mask(mask)

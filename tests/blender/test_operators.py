@@ -267,7 +267,8 @@ LINKED = "The edit is linked from another file"
 ANY_EFFECT = ("smooth_streaks", "shutter_add", "recipe_import", "recipe_export")  # need nothing in it
 ALIKE = {"match_source": "The Shutter strip matches its source"}
 UNSEEN = "Move the playhead onto the Shutter strip"
-REGION_NEEDED = dict.fromkeys(("erase", "region_assign", "region_remove", "region_move", "region_key"), NO_REGION)
+OF_REGION = "erase", "region_assign", "region_remove", "region_move", "region_key", "sharp_subject", "clean_trail"
+REGION_NEEDED = dict.fromkeys(OF_REGION, NO_REGION)
 REGION_UNSEEN = REGION_NEEDED | {"erase": UNSEEN}
 
 
@@ -333,7 +334,7 @@ def test_what_cannot_be_used_says_why(bpy, operators, edit, effect, tmp_path, si
     situation(bpy, edit, effect, tmp_path)
     usual, others = SITUATIONS[situation]
     with bpy.context.temp_override(window=bpy.data.window_managers[0].windows[0]):
-        names = {cls.bl_idname.removeprefix("shutter.") for cls in blender.classes_of(operators)}
+        names = {cls.bl_idname.removeprefix("shutter.") for cls in blender.classes_of(operators)} | {"smooth_streaks"}
         for name in sorted(names - APART):
             operator = getattr(bpy.ops.shutter, name)
             sentence = others.get(name, usual)

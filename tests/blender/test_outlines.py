@@ -6,12 +6,13 @@ from OpenImageIO import ImageBuf
 from support import effect_of, image_strip, recipe, request, write_frames
 
 from shutter_addon.blender.data import selection, snapshot
-from shutter_addon.blender.editing import outline_drawings
-from shutter_addon.blender.rendering import outline_carrying, sessions
+from shutter_addon.blender.editing import region_edits
+from shutter_addon.blender.rendering import sessions
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import outlines
-from shutter_addon.media.carried_mattes import CarriedMattes
-from shutter_addon.media.subject_mattes import CarriedFile
+from shutter_addon.features.outlines.blender import outline_carrying, outline_drawings
+from shutter_addon.features.outlines.carried_mattes import CarriedMattes
+from shutter_addon.features.outlines.subject_mattes import CarriedFile
 
 WIDTH, HEIGHT, COUNT = 96, 64, 12
 OPTIONS = {"light": "encoded", "interpolation": "value"}
@@ -144,7 +145,7 @@ def test_the_next_drawing_needed(bpy, chosen):
     scene = strip.id_data
     scene.frame_set(9)
     wrong = [[(x + 0.12, y) for x, y in each] for each in outline_drawings.curves_now(scene, effect, strip, 0)]
-    outline_drawings.draw(effect, strip, effect.regions[0], wrong, 9)
+    region_edits.draw_curves(effect, strip, effect.regions[0], wrong, 9)
     scene.frame_set(1)
     assert bpy.ops.shutter.outline_needed() == {"FINISHED"}
     frame, confidence = outline_drawings.next_needed(scene, effect, strip, 0)
@@ -282,10 +283,10 @@ def test_what_fails_beside_blender_is_told_once(bpy):
     assert outline_carrying._look() is None  # the timer, which no Blender without a window calls
     assert arrived == [True]
     assert outline_carrying.failure(file) == "internal error: RuntimeError('of a library')"
-    outline_carrying.want(file, 0)
+    outline_carrying.want_matte(file, 0)
     assert outline_carrying.begin(lambda: None) == outline_carrying.failure(file)
     assert outline_carrying.progress() is None
-    outline_carrying.forget()
+    outline_carrying.forget_pictures()
 
 
 class Unreadable:

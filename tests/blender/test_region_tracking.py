@@ -5,9 +5,10 @@ import pytest
 from support import call, does, image_strip, request, started, write_frames
 
 from shutter_addon.blender.data import annotations, fcurves, selection, snapshot, strips
-from shutter_addon.blender.editing import bar_edits, motion_keys, region_edits, track_region
+from shutter_addon.blender.editing import bar_edits, motion_keys, region_edits
 from shutter_addon.blender.editing.motion_keys import MotionKeys
 from shutter_addon.core.model.motions import Placement
+from shutter_addon.features.tracking.blender import track_region
 
 SIZE = np.array([240, 160])
 COUNT = 20

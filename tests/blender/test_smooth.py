@@ -14,9 +14,11 @@ from support import image_strip, picture_of, request, write_frames
 
 from shutter_addon.blender.data import consistency, fcurves, preview_areas, snapshot
 from shutter_addon.blender.editing import add_effect, bar_edits, shutter_edits
-from shutter_addon.blender.rendering import effect_source, previews, render_job, sessions, smooth_previews
+from shutter_addon.blender.rendering import effect_source, previews, render_job, sessions
 from shutter_addon.core.frames import light
-from shutter_addon.media import flow, open_source, smooth
+from shutter_addon.features.smooth import smooth
+from shutter_addon.features.smooth.blender import smooth_previews
+from shutter_addon.media import flow, open_source
 
 STEPS, COUNT, CUT = 4, 12, 6
 LAST = (CUT - 1) * STEPS  # the first shot's last filmed frame, and the moments that are nearest to it:
@@ -229,7 +231,7 @@ def test_motion_is_measured_once(add, edit, tmp_path, monkeypatch):
     """Whatever else changes; another file is another film."""
     asked, steps_for = [], smooth.steps_for
     monkeypatch.setattr(
-        effect_source, "steps_for", lambda *given, **more: asked.append((*given[1:], more)) or steps_for(*given, **more)
+        smooth, "steps_for", lambda *given, **more: asked.append((*given[1:], more)) or steps_for(*given, **more)
     )
     _source, strip, effect = add(moving(tmp_path / "film", 5), np.ones(4), "AUTO")
     for position in ("START", "CENTER", "END"):
@@ -272,8 +274,8 @@ def test_a_still_preview_is_plain_until_its_moments_are_there(film, add, edit, b
     plain = light.to_encoded(frames[[4, 8, 12]].mean(axis=0)) * 255
 
     def asked():
-        smooth_previews.advance(60)
-        return smooth_previews.chosen(drawing, taken, 2, effect_source.FULL)
+        smooth_previews.advance_smooth(60)
+        return smooth_previews.smooth_request(drawing, taken, 2, effect_source.FULL)
 
     def same(request, expected):
         same_pixels(light.to_encoded(drawing.session.picture(request)[..., :3]) * 255, expected, 1)
@@ -292,7 +294,7 @@ def test_a_still_preview_is_plain_until_its_moments_are_there(film, add, edit, b
     both = drawing.request(taken, 2, effect_source.Detail(smooth=False)), request
     renderers = [drawing.renderer(each) for each in both]
     assert renderers[0] is not renderers[1]
-    smooth_previews.rest()  # as it plays
+    smooth_previews.rest_smooth()  # as it plays
     gate.clear()
     assert asked() == request  # what it needs is there: nothing plain comes before
     assert [drawing.renderer(each) for each in both] == renderers

@@ -10,8 +10,8 @@ from support import image_strip, picture_of, request, write_frames
 
 from shutter_addon.blender.data import consistency, fcurves, selection, snapshot
 from shutter_addon.blender.editing import add_effect, bar_edits, shutter_edits
-from shutter_addon.blender.rendering import strobing
-from shutter_addon.media import smooth
+from shutter_addon.features.smooth import smooth
+from shutter_addon.features.smooth.blender import strobing
 
 WIDTH, HEIGHT, COUNT = 320, 180, 12  # at this height, 2 pixels look smooth
 

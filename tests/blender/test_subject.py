@@ -8,10 +8,11 @@ import pytest
 from support import effect_of, image_strip, recipe, request, write_frames
 
 from shutter_addon.blender.data import annotations, preferences, selection, snapshot
-from shutter_addon.blender.editing import outline_drawings
+from shutter_addon.blender.editing import region_edits
 from shutter_addon.blender.output import matte_export
-from shutter_addon.blender.rendering import outline_carrying, sessions
+from shutter_addon.blender.rendering import sessions
 from shutter_addon.core.recipes import recipe_file
+from shutter_addon.features.outlines.blender import outline_carrying, outline_drawings
 
 WIDTH, HEIGHT, COUNT, RADIUS = 192, 128, 6, 28
 STROKE = [[0.3, 0.45], [0.34, 0.5], [0.3, 0.55]]
@@ -53,7 +54,7 @@ def edited(bpy, edit, footage):
         return strip, effect
 
     yield make
-    outline_carrying.forget()
+    outline_carrying.forget_pictures()
     sessions.forget()
 
 
@@ -113,7 +114,7 @@ def test_recipe_and_back(edited, tmp_path):
     drawing = [[[0.2, 0.2], [0.4, 0.2], [0.4, 0.8]]]
     strokes = [{"frame": 1, "strokes": [STROKE]}, {"frame": 3, "strokes": [STROKE, STROKE]}]
     strip, effect = edited(strokes=strokes, not_strokes=[[[0.8, 0.5], [0.9, 0.5]]], width=0.01, layer=True)
-    outline_drawings.draw(effect, strip, effect.regions[0], [np.array(drawing[0])], 5)
+    region_edits.draw_curves(effect, strip, effect.regions[0], [np.array(drawing[0])], 5)
     found = matte_export.recipe_for(strip.id_data, effect, strip, tmp_path / "r.json")
     (region,) = json.loads(recipe_file.dump(found), object_hook=lambda fields: SimpleNamespace(**fields)).regions
     assert (region.kind, region.layer, round(region.width, 6)) == ("subject", True, 0.01)

@@ -13,7 +13,7 @@ from support import recipe, write_frames
 
 from shutter_addon.core.model import motions
 from shutter_addon.core.recipes import recipe_file
-from shutter_addon.media import camera_tracking, part_tracking, tracking
+from shutter_addon.features.tracking import camera_tracking, part_tracking, tracking
 
 ROOT = Path(__file__).parents[2]
 WIDTH, HEIGHT, COUNT = 160, 120, 12

@@ -6,9 +6,9 @@ from support import call, request, write_frames
 from test_region_tracking import COUNT, SIZE, active, drawn, keys, new_source, picture, texture, track
 
 from shutter_addon.blender.data import fcurves, recipe_import, snapshot
-from shutter_addon.blender.editing import track_region
 from shutter_addon.blender.rendering import sessions
 from shutter_addon.core.recipes import recipe_file
+from shutter_addon.features.tracking.blender import track_region
 
 LAST = 46  # the last timeline frame of the footage that is covered
 OTHER = texture(*SIZE[::-1]) // 4

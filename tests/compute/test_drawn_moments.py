@@ -13,7 +13,7 @@ from shutter_addon.core.frames import light
 from shutter_addon.core.model import shutters, windows
 from shutter_addon.core.model.frame_state import FrameState, Options
 from shutter_addon.core.pixels import compositor
-from shutter_addon.media.smooth import SmoothSource
+from shutter_addon.features.smooth.smooth import SmoothSource
 
 STEPS = 4
 ROUNDED = 0.6  # levels: half of one, and what a GPU's pow adds to its argument (0.062 on an NVIDIA H100)

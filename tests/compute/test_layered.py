@@ -19,9 +19,9 @@ from shutter_addon.core.model.mattes import FileFrame, Matte
 from shutter_addon.core.pixels import compositor, layering
 from shutter_addon.core.pixels.layering import separated
 from shutter_addon.devices.device import Budget
+from shutter_addon.features.smooth.smooth import SmoothSource
 from shutter_addon.media.flow import Between
 from shutter_addon.media.matte_values import MatteValues
-from shutter_addon.media.smooth import SmoothSource
 
 SIZE, COUNT, SHOWN = (37, 23), 20, 9
 

@@ -11,8 +11,8 @@ from shutter_addon.compute.renderer import Renderer
 from shutter_addon.compute.request import Request
 from shutter_addon.core.model import shutters
 from shutter_addon.core.model.frame_state import FrameState, Options
+from shutter_addon.features.smooth.smooth import SmoothSource
 from shutter_addon.media.cuts import NEIGHBOURS, ShotSource
-from shutter_addon.media.smooth import SmoothSource
 
 LENGTHS = 7, 6, 9
 ENDS = np.cumsum((0, *LENGTHS))

@@ -127,10 +127,10 @@ def check_mixed(case: Case, devices: dict, folder: Path) -> dict:
     mattes against NumPy's own. Pixels that tie (NUDGE) are left out, few as they are."""
     from shutter_addon.compute.cpu import CPUCompositor
     from shutter_addon.compute.renderer import Renderer
+    from shutter_addon.features.smooth.smooth import steps_for
     from shutter_addon.media import open_source
     from shutter_addon.media.cuts import ShotSource
     from shutter_addon.media.matte_values import MatteValues
-    from shutter_addon.media.smooth import steps_for
 
     recipe = json.loads(case.recipe)
     with tempfile.TemporaryDirectory() as files, open_source(write(case, Path(files))) as medium:

@@ -12,7 +12,8 @@ from shutter_addon.core.model import motions
 from shutter_addon.core.model.effect import STILL_CAMERA, Drawings, Moves, Region
 from shutter_addon.core.model.keyframes import Constant, Keys
 from shutter_addon.core.model.motions import Similarity
-from shutter_addon.media import camera_tracking, open_source, part_tracking, tracking
+from shutter_addon.features.tracking import camera_tracking, part_tracking, tracking
+from shutter_addon.media import open_source
 from shutter_addon.media.footage import Footage
 
 ENDS = np.array([0, WIDTH - 1, 1j * (HEIGHT - 1), WIDTH - 1 + 1j * (HEIGHT - 1)])

@@ -15,9 +15,11 @@ from shutter_addon.core.frames.light import to_encoded, to_linear
 from shutter_addon.core.messages import MediaError
 from shutter_addon.core.model import outlines
 from shutter_addon.core.model.mattes import FileFrame, Matte
-from shutter_addon.media import carried_mattes, carrying, matte_tracking, outlining
+from shutter_addon.features.outlines import carried_mattes, carrying
+from shutter_addon.features.outlines.subject_mattes import CarriedFile
+from shutter_addon.features.tracking import matte_tracking
+from shutter_addon.media import outlining
 from shutter_addon.media.matte_values import MatteValues
-from shutter_addon.media.subject_mattes import CarriedFile
 
 WIDTH, HEIGHT, COUNT = 192, 128, 14
 

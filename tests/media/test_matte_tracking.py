@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from shutter_addon.core.model.motions import Placement
-from shutter_addon.media import matte_tracking
+from shutter_addon.features.tracking import matte_tracking
 
 SIZE = 320, 180
 RANDOM = np.random.default_rng(3)

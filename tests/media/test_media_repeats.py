@@ -8,9 +8,9 @@ from test_media_flow import blocks, frame
 from test_media_steps import Film as Texture
 from test_media_steps import shift
 
+from shutter_addon.features.smooth.smooth import MOST, Repeats, SmoothSource, steps_for
 from shutter_addon.media import MediaError, PrefetchSource, open_source
 from shutter_addon.media.cuts import ShotSource
-from shutter_addon.media.smooth import MOST, Repeats, SmoothSource, steps_for
 
 WIDTH, HEIGHT, SPEED, STEP = 256, 144, 4, 4
 PULLDOWN = [k * 4 // 5 for k in range(15)]  # 24 in 30: pictures 0 0 1 2 3 4 4 5 …

@@ -13,8 +13,9 @@ from test_media_steps import Film, shift
 
 from shutter_addon.core.frames.planes import as_rgba
 from shutter_addon.core.model.shutters import MAX_WINDOW
-from shutter_addon.media import MediaError, PrefetchSource, opencv, smooth
-from shutter_addon.media.smooth import SmoothSource, steps_for
+from shutter_addon.features.smooth import smooth
+from shutter_addon.features.smooth.smooth import SmoothSource, steps_for
+from shutter_addon.media import MediaError, PrefetchSource, opencv
 
 SPEED = 8  # pixels from a frame to the next
 

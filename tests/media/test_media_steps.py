@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from shutter_addon.core.model.motions import Similarity
-from shutter_addon.media import smooth
+from shutter_addon.features.smooth import smooth
 
 STILL = Similarity()
 

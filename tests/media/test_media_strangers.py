@@ -14,8 +14,9 @@ import pytest
 from footage import save_image
 from test_carrying import HEIGHT, WIDTH, Footage, drawings
 
-from shutter_addon.media import MediaError, carried_mattes, derived
-from shutter_addon.media.subject_mattes import CarriedFile
+from shutter_addon.features.outlines import carried_mattes
+from shutter_addon.features.outlines.subject_mattes import CarriedFile
+from shutter_addon.media import MediaError, derived
 
 if os.name != "posix":
     pytest.skip("pipes, sockets and devices by name, alarms: of POSIX systems only", allow_module_level=True)

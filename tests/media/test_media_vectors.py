@@ -8,9 +8,9 @@ from test_media_flow import pan
 from test_media_smooth import Panned
 
 from shutter_addon.core.frames.planes import as_rgba
+from shutter_addon.features.smooth.smooth import SmoothSource
 from shutter_addon.media import MediaError, derived, flow
 from shutter_addon.media.derived import StoredVectors
-from shutter_addon.media.smooth import SmoothSource
 
 
 @pytest.fixture

@@ -3,9 +3,9 @@
 import numpy as np
 
 from shutter_addon.core.frames.frame_source import FrameSource
+from shutter_addon.features.smooth.smooth import SmoothSource
 from shutter_addon.media import PrefetchSource, open_source
 from shutter_addon.media.cuts import ShotSource
-from shutter_addon.media.smooth import SmoothSource
 
 
 def test_through_all_wrappers(bunny):

@@ -12,9 +12,9 @@ from test_carrying import Footage
 
 from shutter_addon.core.messages import MediaError
 from shutter_addon.core.model import outlines
-from shutter_addon.media import subject_mattes
-from shutter_addon.media.subject import MODEL, Network
-from shutter_addon.media.subject_mattes import CarriedFile, Subject
+from shutter_addon.features.outlines import subject_mattes
+from shutter_addon.features.outlines.subject import MODEL, Network
+from shutter_addon.features.outlines.subject_mattes import CarriedFile, MarkedSubject
 
 WIDTH, HEIGHT, COUNT = 240, 160, 5
 GROUND = cv2.resize(np.random.default_rng(1).integers(90, 130, (12, 40, 3), np.uint8), (2 * WIDTH, HEIGHT))
@@ -62,7 +62,7 @@ def iou(matte, mask):
 def opened(tmp_path):
     def made(strokes, nots=None, drawings=(), **what):
         footage = film(tmp_path, **what)
-        return CarriedFile(footage, drawings, tmp_path / "mattes", Subject(strokes, nots or {})).open()
+        return CarriedFile(footage, drawings, tmp_path / "mattes", MarkedSubject(strokes, nots or {})).open()
 
     return made
 
@@ -134,5 +134,5 @@ def test_models_that_cannot_be_used(tmp_path):
         with pytest.raises(MediaError, match=f"{path.name}: is damaged, or no ONNX model that OpenCV can run"):
             Network(path)
     with pytest.raises(MediaError, match=r"^missing\.onnx: cannot be read \(No such file or directory\)$"):
-        CarriedFile(film(tmp_path), (), subject=Subject({}, {}), model=tmp_path / "missing.onnx").open()
+        CarriedFile(film(tmp_path), (), subject=MarkedSubject({}, {}), model=tmp_path / "missing.onnx").open()
     assert subject_mattes.MODEL == MODEL

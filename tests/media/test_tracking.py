@@ -12,7 +12,8 @@ from shutter_addon.core.model import scribbles
 from shutter_addon.core.model.effect import Drawings, Moves, Region
 from shutter_addon.core.model.keyframes import Constant, Keys
 from shutter_addon.core.model.motions import Similarity
-from shutter_addon.media import open_source, part_tracking, tracking
+from shutter_addon.features.tracking import part_tracking, tracking
+from shutter_addon.media import open_source
 from shutter_addon.media.footage import Footage
 
 ASSETS = Path(__file__).parents[2] / "assets"

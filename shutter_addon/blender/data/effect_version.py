@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 from bpy.types import PropertyGroup, Scene, Strip
 
+from ... import features
 from ...core import revision
 from ...core.frames.retiming import StripTiming
 from ...core.messages import EffectError, UserError
@@ -18,7 +19,7 @@ from ...core.model import effect as model
 from ...core.model.fields import fields_of
 from ...core.model.frame_state import Options
 from ...media import MediaError
-from . import fcurves, mask_reading, matte_content, preferences, snapshot, source_media, strips, versions
+from . import fcurves, matte_content, preferences, snapshot, source_media, strips, versions
 from .annotations import LAYERS, TRANSFORM, layer_of, picture_size
 from .external_files import every
 from .fcurves import numbers
@@ -184,7 +185,7 @@ def _matte(region: PropertyGroup, files: Files, start: int | None) -> Iterator[H
         if region.matte == "MASK" and region.mask is not None:
             # Blender reports changes of a mask, and many points take long to read.
             mask = region.mask
-            yield revision.until_change("mask", mask.session_uid, lambda: repr(mask_reading.still(mask)))
+            yield revision.until_change("mask", mask.session_uid, lambda: repr(features.needed("still_mask")(mask)))
     except (MediaError, EffectError) as error:
         yield str(error)
 

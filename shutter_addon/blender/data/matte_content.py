@@ -13,16 +13,17 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import PropertyGroup, Strip
 
+from ... import features
 from ...core.messages import EffectError
 from ...core.model import keyframes, mattes
 from ...core.model.clip import Clip
 from ...core.model.effect import Moves, placed_ramp
 from ...core.model.keyframes import Channel
-from ...media.carried_mattes import FOLDER
+from ...media.derived import MATTES
 from ...media.files import stamp
 from ...media.opening import MatteFile
 from ...media.sequence import sequence_files
-from . import mask_reading, source_media, strips, validation
+from . import source_media, strips, validation
 from .external_files import absolute
 from .sampled import Sampling
 
@@ -46,7 +47,7 @@ def content(sampling: Sampling, region: PropertyGroup, moves: Moves) -> Channel:
     if matte == "MASK":
         if region.mask is None:
             raise EffectError(rpt_("{place}: it has no mask").format(place=validation.place(region)))
-        return keyframes.Constant(mask_reading.still(region.mask))
+        return keyframes.Constant(features.needed("still_mask")(region.mask))
     first = strips.origin(sampling.strip) if validation.word(region, "timing") == "TIMELINE" else None
     return mattes.FileFrames(file=image_file(region), offset=validation.number(region, "offset"), first=first)
 
@@ -62,7 +63,7 @@ def tracked(sampling: Sampling) -> dict[str, Any]:
         EffectError, MediaError: There is no source.
     """
     beside = Path(bpy.data.filepath).parent if bpy.data.filepath else Path(bpy.app.tempdir)  # which Blender clears
-    return {"footage": source_media.spec(_source(sampling)), "folder": beside / FOLDER}
+    return {"footage": source_media.spec(_source(sampling)), "folder": beside / MATTES}
 
 
 def channel(region: PropertyGroup) -> str:

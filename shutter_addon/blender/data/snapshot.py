@@ -15,6 +15,7 @@ import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import FCurve, PropertyGroup, Scene, Strip
 
+from ... import features
 from ...core.frames.retiming import StripTiming
 from ...core.messages import EffectError, UserError, translated
 from ...core.model import effect as model
@@ -22,7 +23,6 @@ from ...core.model import following, keyframes, limits, mattes, outlines
 from ...core.model.fields import fields_of
 from ...core.model.frame_state import Options
 from ...core.recipes import key_fitting
-from ...media.subject_mattes import CarriedFile, Subject
 from . import matte_content, preferences, sampled, source_media, strips, validation
 from .annotations import LAYERS, image_to_picture, layer_of, layers_of, picture_size
 from .fcurves import curves_under, points_of, progress, stretched
@@ -179,7 +179,7 @@ def region_at(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, fra
 
 def carried_outline(
     scene: Scene, effect: PropertyGroup, strip: Strip, index: int, frames: Frames
-) -> tuple[CarriedFile, dict[float, int]]:
+) -> tuple[Any, dict[float, int]]:
     """Return the file of a tracked outline's or a subject's mattes, and the filmed frames that timeline frames show.
 
     Raises:
@@ -316,7 +316,7 @@ def _any_region(sampling: Sampling, index: int, shutter: int) -> model.Region | 
     return kind(shutter=shutter, content=content, moves=moves, **drawn, **sampling.fields(region, path, kind))
 
 
-def _drawn(sampling: Sampling, index: int) -> tuple[dict[str, Any], CarriedFile | None]:
+def _drawn(sampling: Sampling, index: int) -> tuple[dict[str, Any], Any]:
     """Return what is drawn in an outline or a subject, by the model's names, and the file of its tracked mattes.
 
     The mattes of a linear outline are not tracked, so that it has no file.
@@ -333,9 +333,9 @@ def _drawn(sampling: Sampling, index: int) -> tuple[dict[str, Any], CarriedFile 
     *marks, curves = (_by_source_frame(sampling, each) for each in drawn.values())
     made: dict = matte_content.tracked(sampling) | {"drawings": tuple(sorted(curves.items()))}
     if not is_subject:
-        return drawn, CarriedFile(**made)
-    subject = Subject(strokes=marks[0], nots=marks[1])
-    return drawn, CarriedFile(**made, subject=subject, model=preferences.model())
+        return drawn, features.needed("CarriedFile")(**made)
+    subject = features.needed("MarkedSubject")(strokes=marks[0], nots=marks[1])
+    return drawn, features.needed("CarriedFile")(**made, subject=subject, model=preferences.model())
 
 
 def _by_source_frame(sampling: Sampling, drawings: model.Drawings) -> dict[int, outlines.Curves]:

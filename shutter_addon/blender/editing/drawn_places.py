@@ -11,7 +11,7 @@ from ...core.model.effect import Drawings
 from ...core.model.motions import Placement
 from ..data import snapshot, strips
 from ..data.sampled import Sampling
-from . import motion_keys, outline_drawings
+from . import motion_keys, region_edits
 
 
 def hold(effect: PropertyGroup, index: int) -> None:
@@ -38,7 +38,7 @@ def begin(effect: PropertyGroup, strip: Strip, index: int, *, erases: bool = Fal
     here, origins = shown.placement(frame), _origins(shown.drawings)
     is_elsewhere = any(origin != here for origin in origins.values())
     if origins.get(frame, here) != here or (erases and is_elsewhere and frame not in origins):
-        outline_drawings.draw(effect, strip, region, shown.at(frame).strokes, frame)
+        region_edits.draw_curves(effect, strip, region, shown.at(frame).strokes, frame)
     if motion_keys.MotionKeys(effect, index, region.motion).are_made():
         with suppress(EffectError):  # with locked curves, tracking stops, too
             motion_keys.insert(effect, index)

@@ -1,11 +1,17 @@
 """Edit an effect's regions and their annotation layers: add, remove, move, key."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.types import AnnotationLayer, PropertyGroup
+from bpy.types import AnnotationLayer, PropertyGroup, Strip
 
+from ...core import revision
+from ...core.messages import EffectError
 from ...core.model import limits
-from ..data import fcurves, selection, strips
+from ...core.model.outlines import Curves
+from ...core.model.scribbles import mapped
+from ..data import annotations, fcurves, selection, strips
 from ..data.annotations import LAYERS, NOT_THIS, annotation, layer_of, layers_of
 from ..data.consistency import bars, choose_region, color_layers, forget_followed, unique
 
@@ -76,6 +82,30 @@ def new_layer(effect: PropertyGroup, region: PropertyGroup, name: str = "layer")
     layer.color = NOT_THIS if name == "not_layer" else effect.shutters[region.shutter].color
     setattr(region, name, layer.info)
     return layer
+
+
+def draw_curves(
+    effect: PropertyGroup, strip: Strip, region: PropertyGroup, curves: Curves | Sequence[np.ndarray], frame: int
+) -> None:
+    """Make curves the drawing of a region at a timeline frame.
+
+    Args:
+        curves: in fractions of the picture.
+
+    Raises:
+        EffectError: the strip has a scale of 0.
+    """
+    to_image = annotations.picture_to_image(strip, annotations.picture_size(effect))
+    if not annotations.is_invertible(to_image):
+        raise EffectError(rpt_('strip "{strip}" has a scale of 0').format(strip=strip.name))
+    name = "outline_layer" if region.kind == "SUBJECT" else "layer"
+    layer = layer_of(effect, region, name) or new_layer(effect, region, name)
+    for drawing in [drawing for drawing in layer.frames if drawing.frame_number == frame]:
+        layer.frames.remove(drawing)
+    drawing = layer.frames.new(frame)
+    for points in curves:
+        annotations.add_stroke(drawing, mapped(to_image, np.asarray(points)))
+    revision.changed()  # Blender does not report new strokes
 
 
 def remove_layers(effect: PropertyGroup, region: PropertyGroup) -> None:

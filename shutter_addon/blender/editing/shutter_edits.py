@@ -5,17 +5,14 @@ And operators of one click: subjects as layers without ghosts, and exposures tha
 
 import numpy as np
 from bpy.app.translations import pgettext_data as data_
-from bpy.types import PropertyGroup, Scene, Strip
+from bpy.types import PropertyGroup
 
 from ...core.model import shutters
 from ...media import opencv
-from ..data import fcurves, property_copy, snapshot, validation
+from ..data import fcurves, property_copy, validation
 from ..data.consistency import unique
-from . import bar_edits, track_region
-from .motion_keys import MotionKeys
+from . import bar_edits
 from .region_edits import add_region, assign_region, remove_region
-
-SMOOTHNESS = 6  # frames before and after each: half a second
 
 # Distinct for color-blind people: seven by Okabe and Ito (https://jfly.uni-koeln.de/color), and the three farthest from
 # them for all eyes.
@@ -98,21 +95,6 @@ def duplicate_shutter(effect: PropertyGroup, index: int) -> PropertyGroup:
     return effect.shutters[index + 1]
 
 
-def follow(effect: PropertyGroup, index: int, subject: str, key: bool) -> None:
-    """Make a shutter follow its region ("REGION") or the camera ("CAMERA"), fully open around the frame.
-
-    Args:
-        key: insert keyframes for its bars.
-
-    Raises:
-        EffectError: the window has no length. Nothing has changed.
-    """
-    apply_preset(effect, index, "ANGLE_360", key)
-    shutter = effect.shutters[index]
-    shutter.follow, shutter.length, effect.position = subject, "FRAMES", "CENTER"
-    shutter.follow_motion, shutter.follow_smooth = "SCALE", 0
-
-
 def remove_shutter(effect: PropertyGroup, index: int) -> None:
     """Remove a shutter, its keyframes and its regions. The first remaining one is the default."""
     name = effect.shutters[index].name
@@ -175,48 +157,3 @@ def as_layer(effect: PropertyGroup, index: int, own: str, rest: str, key: bool =
     for i, preset in ((place, own), (0, rest)):
         effect.shutters[i].follow, effect.shutters[i].length = "NOTHING", "FRAMES"
         apply_preset(effect, i, preset, key)
-
-
-def panning_shot(effect: PropertyGroup, index: int, key: bool = False) -> None:
-    """Make a region a sharp layer, and make the other exposure move with it, like a panning camera.
-
-    Args:
-        key: insert keyframes for the bars.
-    """
-    as_layer(effect, index, "STILL", "ANGLE_360", key)
-    region = effect.regions[index]
-    region.name = unique(region.name, {other.name for other in effect.regions if other != region})
-    follow(effect, 0, "REGION", key)
-    default = effect.shutters[0]
-    default.follow_region = region.name
-    # Rotation and scale of a small subject are uncertain and would whirl distant pixels. A real camera pans smoothly.
-    default.follow_motion, default.follow_smooth = "LOCATION", SMOOTHNESS
-
-
-def is_tracked(scene: Scene, effect: PropertyGroup, strip: Strip, index: int | None) -> bool:
-    """Return whether a region or the camera has a motion that reaches the current frame, which may be in another shot.
-
-    Otherwise *Panning Shot* and *Stabilize Exposure* track it first.
-    """
-    frame = scene.frame_current
-    has_motion = MotionKeys(effect, index, "SCALE").reach(frame)
-    return has_motion and (index is None or bool(snapshot.strokes_at(scene, effect, strip, index, frame)))
-
-
-def tripod(effect: PropertyGroup, key: bool = False) -> None:
-    """Make the active shutter follow the camera, fully open around the frame.
-
-    Without a region it covers nothing, so the default shutter is used instead.
-
-    Args:
-        key: insert keyframes for the bars.
-
-    Raises:
-        EffectError: the window has no length. Nothing has changed.
-    """
-    index, name = effect.active_shutter, effect.shutters[effect.active_shutter].name
-    if not any(region.shutter == name for region in effect.regions):
-        index = 0
-    follow(effect, index, "CAMERA", key)
-    effect.active_shutter = index
-    track_region.key_ends(effect, None)  # the window has moved

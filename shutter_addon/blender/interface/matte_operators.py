@@ -6,14 +6,14 @@ import bpy
 from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, EnumProperty, StringProperty
-from bpy.types import Context, Mask, Operator, PropertyGroup
+from bpy.types import Context, Operator, PropertyGroup
 from bpy_extras.io_utils import ImportHelper
 
 from ...core.messages import UserError
 from ...core.model.choices import RAMPS
 from ...core.model.limits import MAX_CHANNEL
 from ..data import matte_content, recipe_import, selection, strips
-from ..editing import outline_drawings, region_edits, shutter_edits
+from ..editing import region_edits, shutter_edits
 from ..output import matte_export
 from . import needs
 from .operator_bases import OfEffect, chosen_file, given, kept, operator
@@ -56,36 +56,6 @@ def matte_strip(self: Operator, _context: Context, effect: PropertyGroup) -> Non
     """Make a movie, image or clip strip of the edit the matte of the active shutter, even if it is muted"""
     region = region_edits.add_region(effect, selection.active_shutter(effect), "MATTE", self.strip, matte="STRIP")
     matte_content.choose_strip(region, self.strip)
-
-
-@kept
-def _masks(_context: Context) -> list[tuple]:
-    return [(mask.name_full, mask.name_full, "") for mask in bpy.data.masks]
-
-
-def _mask_named(name: str) -> Mask:
-    return next(mask for mask in bpy.data.masks if mask.name_full == name)
-
-
-def _why_no_mask(_effect: PropertyGroup) -> str | None:
-    return None if bpy.data.masks else rpt_("There is no mask: draw one in the Mask mode of an image or clip")
-
-
-_MASK = EnumProperty(name="Mask", items=_masks, translation_context=contexts.no_translation)
-
-
-@operator("Matte from Mask", needs.room_for_a_region, _why_no_mask, icon="MOD_MASK", mask=_MASK)
-def matte_mask(self: Operator, _context: Context, effect: PropertyGroup) -> None:
-    """Make a mask the matte of the active shutter"""
-    mask = _mask_named(self.mask)
-    region_edits.add_region(effect, selection.active_shutter(effect), "MATTE", mask.name, matte="MASK", mask=mask)
-
-
-@operator("Outline from Mask", needs.room_for_a_region, _why_no_mask, icon="CURVE_BEZCIRCLE", mask=_MASK)
-def outline_from_mask(self: Operator, _context: Context, effect: PropertyGroup) -> None:
-    """Make an outline of the active shutter that moves as a mask does"""
-    shutter = selection.active_shutter(effect)
-    outline_drawings.from_mask(self.edit, effect, self.effect_strip, shutter, _mask_named(self.mask))
 
 
 class SHUTTER_OT_matte_export(OfEffect, ImportHelper, Operator):

@@ -24,7 +24,8 @@ def strip_menu(layout: UILayout, _context: Context) -> None:
     draw_operators(layout, "add_effect", "draw", "erase", "")
     draw_operators(layout, "effect_copy", "effect_paste", "recipe_import", "recipe_export", "")
     for end in ("shutter", "bars", "region", "outline", "track", "camera", "footage", "bake", "preview"):
-        layout.menu(f"SHUTTER_MT_of_{end}")
+        if end not in _MENUS or any(hasattr(bpy.types, f"SHUTTER_OT_{name}") for name in _MENUS[end][1:]):
+            layout.menu(f"SHUTTER_MT_of_{end}")
     draw_operators(layout, "", "copy_report")
 
 

@@ -17,7 +17,16 @@ from ...core.model.choices import CONTEXT, DRAWN
 from ...core.recipes import recipe_file
 from ..data import annotations, consistency, data_format, preview_areas, recipe_import, selection, strips
 from ..devices import main_thread
-from ..editing import add_effect, bar_edits, drawn_places, region_edits, shown_annotations, shutter_edits, undelete
+from ..editing import (
+    add_effect,
+    bar_edits,
+    drawn_places,
+    motion_keys,
+    region_edits,
+    shown_annotations,
+    shutter_edits,
+    undelete,
+)
 from ..editing import match_source as matching
 from ..output import error_report, matte_export
 from . import needs, sharp_frame
@@ -91,14 +100,22 @@ def match_source(self: Operator, _context: Context, effect: PropertyGroup) -> No
         report(self, sentence.format(neighbor=neighbor.name, strip=self.effect_strip.name))
 
 
-def _why_smooth(effect: PropertyGroup) -> str | None:
-    return None if effect.inbetween == "1" else rpt_("The exposures are already smooth")
+@operator("Insert Region Keyframes", needs.a_region, icon="KEY_HLT")
+def region_key(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
+    """Insert keyframes for location, rotation and scale of the active region at the current frame"""
+    motion_keys.insert(effect, effect.active_region)
 
 
-@operator("Smooth Streaks", _why_smooth)
-def smooth_streaks(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
-    """Expose as many moments between filmed frames as the footage needs"""
-    effect.inbetween = "AUTO"
+@operator("Sharp Subject", needs.a_region)
+def sharp_subject(_self: Operator, context: Context, effect: PropertyGroup) -> None:
+    """Keep the active region sharp in front of a long exposure of everything else"""
+    shutter_edits.as_layer(effect, effect.active_region, "STILL", "ANGLE_360", bar_edits.auto_key(context))
+
+
+@operator("Trail", needs.a_region)
+def clean_trail(_self: Operator, context: Context, effect: PropertyGroup) -> None:
+    """Make the active region leave a trail in front of everything else, which stays sharp"""
+    shutter_edits.as_layer(effect, effect.active_region, "ANGLE_360", "STILL", bar_edits.auto_key(context))
 
 
 def show_panel(context: Context) -> None:

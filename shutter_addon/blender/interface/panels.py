@@ -6,6 +6,7 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.types import Context, Panel, PropertyGroup, Scene, Strip, UILayout, UIList
 
+from ... import features
 from ...core.messages import EffectError
 from ...core.model import shutters
 from ...core.model.choices import CONTEXT
@@ -13,7 +14,6 @@ from ...core.model.effect import Shutter
 from ...core.model.fields import fields_of
 from ..data import annotations, consistency, data_format, selection, strips
 from ..editing import bar_edits, match_source
-from ..rendering import strobing
 from . import region_panels
 from .panel_parts import WIDEST, draw_list, draw_operators, draw_properties, menu, panel, pattern_icon, sentence
 
@@ -72,10 +72,8 @@ def preset_menu(layout: UILayout, _context: Context) -> None:
 
 @menu("regions", "Region Specials")
 def region_menu(layout: UILayout, _context: Context) -> None:
-    subject = layout.operator("shutter.draw", text="Draw Subject", icon=_ICONS["SUBJECT"])
-    subject.new, subject.kind = True, "SUBJECT"
-    outline = layout.operator("shutter.draw", text="Draw Outline", icon=_ICONS["OUTLINE"])
-    outline.new, outline.kind = True, "OUTLINE"
+    for draw_new in features.each("draw_new"):
+        draw_new(layout)
     draw_operators(layout, "", "matte_add", "matte_strip", "matte_mask", "outline_from_mask", "ramp_add")
     draw_operators(layout, "", "time_map", "rolling_shutter", "find_readout")
 
@@ -116,7 +114,8 @@ class SEQUENCER_PT_shutter(Panel):
             row.operator("shutter.draw", text="Not This", icon="X").not_this = True
         draw_operators(row, "erase")
         row.menu("SHUTTER_MT_regions", text="", icon="DOWNARROW_HLT")
-        region_panels.draw_tracking(layout, effect.active_region, is_subject)
+        for draw_tracking in features.each("draw_tracking"):
+            draw_tracking(layout, effect.active_region, is_subject)
         draw_operators(layout.row(align=True), "sharp_subject", "panning_shot", "clean_trail")
 
 
@@ -135,12 +134,8 @@ def _draw_exposure(layout: UILayout, scene: Scene, effect: PropertyGroup, strip:
     row.operator("shutter.bars_key", text="", icon="KEY_HLT")
     row.operator("shutter.bars_unkey", text="", icon="KEY_DEHLT")
     layout.prop(effect, "window")
-    row = layout.row(align=True)
-    row.prop(effect, "inbetween")
-    if effect.inbetween != "1":
-        row.prop(effect, "skip_repeats", text="", icon="FRAME_NEXT")
-        if strobing.repeats(effect):
-            sentence(layout, iface_("The source repeats frames: motion continues across them"), "INFO")
+    for draw_smooth in features.each("draw_smooth"):
+        draw_smooth(layout, effect)
     layout.prop(shutter, "length")
     if shutter.length == "MOTION" and shutter.follow != "NOTHING":
         layout.prop(shutter, "trail")
@@ -189,9 +184,8 @@ def _draw_live(layout: UILayout, context: Context) -> None:
     row.operator("shutter.full_quality", text="", icon="VIEW_ZOOM")
     notes = row.row(align=True)
     effect = selection.active(context)[1]
-    found = {region_panels.tracking_icon(effect, index) for index in _tracked(effect)} | {
-        "INFO" for _note in _notes(context)
-    }
+    found = {icon(effect, index) for icon in features.each("tracking_icon") for index in _tracked(effect)}
+    found |= {"INFO" for _note in _notes(context)}
     notes.enabled = bool(found - {None})
     notes.alert = "ERROR" in found
     notes.popover("SHUTTER_PT_notes", text="", icon="ERROR" if notes.alert else "INFO")
@@ -220,8 +214,8 @@ def _notes(context: Context) -> Iterator[tuple[str, str]]:
         if shown.has_effects:
             words = iface_("The effect does not use effect strips of the source: make the Shutter strip their input")
             yield words, ""
-    if (step := strobing.last(effect)) is not None:
-        yield strobing.too_few_frames(step), "shutter.smooth_streaks"
+    for notes in features.each("notes"):
+        yield from notes(effect)
 
 
 def _tracked(effect: PropertyGroup) -> list[int | None]:
@@ -250,8 +244,9 @@ class SHUTTER_PT_notes(Panel):
             sentence(column, words, "INFO")
             if operator:
                 column.operator(operator)
-        for index in _tracked(effect):
-            region_panels.draw_tracked(layout, effect, index)
+        for draw_tracked in features.each("draw_tracked"):
+            for index in _tracked(effect):
+                draw_tracked(layout, effect, index)
 
 
 def _draw_move(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:
@@ -262,7 +257,8 @@ def _draw_move(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: S
     if shutter.follow != "NOTHING":
         draw_properties(layout, shutter, "follow_motion", "follow_smooth")
     if shutter.follow == "CAMERA":
-        region_panels.draw_tracking(layout, None)
+        for draw_tracking in features.each("draw_tracking"):
+            draw_tracking(layout, None)
 
 
 def _draw_options(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:
@@ -283,17 +279,7 @@ classes = (
     SEQUENCER_PT_shutter,
     panel("_regions", "Regions", region_panels.draw_regions, bl_options=set()),
     panel("_transform", "Transform", region_panels.draw_transform, selection.active_region, "_regions"),
-    panel(
-        "_track",
-        "Track",
-        region_panels.draw_track,
-        region_panels.has_strokes,
-        "_regions",
-        bl_translation_context=CONTEXT,
-    ),
-    panel("_follow", "Follow Track", region_panels.draw_follow, selection.active_region, "_regions"),
     panel("_exposure", "", _draw_exposure, selection.active_shutter, bl_options=set(), draw_header=_draw_header),
     panel("_move", "Exposure Moves With", _draw_move, selection.active_shutter, "_exposure"),
-    panel("_camera", "Camera", region_panels.draw_camera, region_panels.has_camera),
     panel("_options", "Options", _draw_options),
 )

@@ -12,6 +12,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import PointerProperty
 from bpy.types import Context, PropertyGroup, Region
 
+from ... import features
 from ...compute.renderer import Renderer
 from ...compute.request import Request
 from ...core import stopping
@@ -26,7 +27,7 @@ from ..data.properties import with_fields
 from ..data.snapshot import Snapshot
 from ..devices import blender_gpu, main_thread
 from ..editing import shown_annotations
-from ..rendering import effect_source, invalidation, outline_carrying, pictures, previews, render_job, strobing
+from ..rendering import effect_source, invalidation, pictures, previews, render_job
 from ..rendering.previews import Decision, Drawing
 from . import drawing, sharp_frame
 from .drawing import Quad
@@ -57,8 +58,6 @@ _CHOSEN, _REDRAWN = {"update": _view_chosen}, {"update": preview_areas.redraw}
 Colors = Sequence[Sequence[float]]  # display values
 Say = Callable[[str], None]  # adds a note
 _NAVIGATION = 56  # interface units: Blender's navigation buttons at the right of a preview
-_TICK = 0.25  # seconds
-_STILL = 0.4  # seconds after which a frame counts as still
 _SOON = 0.1  # seconds
 
 
@@ -187,13 +186,15 @@ def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, s
     if settings.view not in ("SCRIBBLES", "COEFFICIENTS"):
         _show_strokes(context, quad, shown, wanted.decision.snapshot)
     previews.looking.slices.end()
-    _tell_carrying(say)
+    for note_tracking in features.each("note_tracking"):
+        note_tracking(say)
     for sentence in pictures.shortages(renderer, wanted.decision.snapshot, request):
         say(sentence)
     # Measuring would slow down what is running.
     decision = wanted.decision
     if context.space_data.show_overlays and is_still and not decision.is_plain and not previews.may_be_late():
-        _tell_strobing(*strobing.look(shown.effect, decision.snapshot, renderer, decision.request), say)
+        for note_streaks in features.each("note_streaks"):
+            note_streaks(shown.effect, decision.snapshot, renderer, decision.request, say)
 
 
 def _warn(shown: Shown, say: Say) -> None:
@@ -225,24 +226,6 @@ def _tell_detail(wanted: Drawing, size: tuple[int, int], say: Say) -> None:
         say(rpt_("Preview: {what}").format(what=", ".join(less)))
 
 
-def _tell_strobing(known: float | None, is_new: bool, say: Say) -> None:
-    """Add a note about too few frames, as strobing.look returns it."""
-    if known is not None:
-        say(strobing.too_few_frames(known))
-    if is_new:
-        main_thread.later(preview_areas.redraw_panels)  # panels may have been drawn before
-    if strobing.is_busy():
-        main_thread.drop(_measure)
-        main_thread.later(_measure, _STILL)  # when the frame stays
-
-
-def _measure() -> float | None:
-    """Measure strobing, a little at a time."""
-    if strobing.advance():
-        preview_areas.redraw()
-    return _TICK if strobing.is_busy() else None
-
-
 def _show_sharp(context: Context, shown: Shown | None) -> None:
     """Draw notes and strokes over the source frame."""
     with drawing.pixel_space(context.region), suppress(*effect_source.FAULTS):
@@ -251,16 +234,6 @@ def _show_sharp(context: Context, shown: Shown | None) -> None:
             quad = Quad(context.region, shown)
             snapshot = invalidation.current(shown.scene, shown.effect, shown.strip, shown.scene.frame_current)
             _show_strokes(context, quad, shown, snapshot)
-
-
-def _tell_carrying(say: Say) -> None:
-    """Track missing mattes of outlines, and add a note on the progress."""
-    fault, progress = outline_carrying.begin(previews.show_carried), outline_carrying.progress()
-    if fault is not None:
-        say(rpt_("Shutter: {fault}").format(fault=fault))
-    if progress is not None:
-        done, total = progress
-        say(rpt_("Tracking the outline: {done} of {total} frames").format(done=done, total=total))
 
 
 def _show_strokes(context: Context, quad: Quad, shown: Shown, snapshot: Snapshot) -> None:

@@ -8,17 +8,12 @@ a subject is looked for under it.
 from dataclasses import dataclass
 
 import bpy
-from bpy.app.translations import contexts
-from bpy.app.translations import pgettext_iface as iface_
 from bpy.types import Context, SpaceSequenceEditor
 
-from ...core.messages import UserError
+from ... import features
 from ..data import consistency, preview_areas, selection, strips
 from ..devices import main_thread
-from ..editing import subjects
-from ..rendering.effect_source import FAULTS
 from ..rendering.previews import pen_is_down
-from .operator_bases import popup, redraw
 
 _TOOLS = "builtin.annotate"  # prefix of the tools' names
 
@@ -119,27 +114,10 @@ def _lay_down() -> None:
         give_back(bpy.context)
         if _pen.tool:
             _choose(bpy.context, _pen.tool)
-        _find_subject(bpy.context)
-
-
-def _find_subject(context: Context) -> None:
-    """Look for a subject under the first stroke of a new effect; the pen draws on the subject from now on."""
-    seen = selection.in_picture(context)
-    region = selection.active_region(seen[1]) if seen else None
-    if region is None:
-        return
-    scene, effect, strip = seen
-    consistency.aim_pen(effect)
-    if not subjects.is_first_stroke(effect, region):
-        return
-    try:
-        is_found = subjects.find(scene, effect, strip, effect.active_region)
-    except (*FAULTS, UserError) as error:
-        popup(context, str(error), icon="ERROR")
-        return
-    if is_found:
-        bpy.ops.ed.undo_push(message=iface_("Find Subject", contexts.operator_default))
-        redraw(context)
+        if (seen := selection.in_picture(bpy.context)) and selection.active_region(seen[1]):
+            consistency.aim_pen(seen[1])
+            for after_stroke in features.each("after_stroke"):
+                after_stroke(bpy.context, *seen)
 
 
 _OWNER = object()  # of the message bus subscription

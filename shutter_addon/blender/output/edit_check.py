@@ -10,7 +10,6 @@ from ...compute.request import Request
 from ...core.frames import frame_ranges
 from ...core.frames.frame_source import FrameSource
 from ...core.model.mattes import FileFrame
-from ...media.carried_mattes import CarriedMattes
 from ...media.files import check_file
 from ..data import requirements, snapshot, source_media, strips
 from ..rendering import effect_source, job_snapshots, pictures
@@ -127,7 +126,7 @@ def _lacking_mattes(source: FrameSource, requests: list[Request], folders: set[P
         with file.open() as medium:
             indices = {content.index(medium, index) for content, index in contents}
             indices = {min(max(index, 0), medium.count - 1) for index in indices}
-            if not isinstance(medium, CarriedMattes):
+            if not hasattr(medium, "straight"):  # it is not tracked
                 _check_readable(medium, indices)
             elif missing := sum(not medium.has(index) for index in indices):
                 lacking += missing

@@ -6,6 +6,7 @@ import traceback
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from ... import features
 from ...core import recent_errors
 from ...core.caches import RecentValues
 from ...core.frames.frame_source import FrameSource
@@ -17,7 +18,6 @@ from ...media import MediaError
 from ...media.cuts import ShotSource
 from ...media.derived import VECTORS, StoredVectors
 from ...media.prefetch import PrefetchSource
-from ...media.smooth import SmoothSource, steps_for
 from ..data.snapshot import Snapshot
 from ..data.source_media import Proxy, SourceSpec
 
@@ -107,7 +107,7 @@ class SourceKey:
             return ShotSource(PrefetchSource(medium, planes=planes))
         try:
             vectors = None if self.folder is None else StoredVectors(self.folder / VECTORS, keeps)
-            smooth = SmoothSource(medium, self.steps, vectors, skip_repeats=self.skip_repeats)
+            smooth = features.needed("SmoothSource")(medium, self.steps, vectors, skip_repeats=self.skip_repeats)
             return ShotSource(PrefetchSource(smooth, planes=True), self.steps)
         except FAULTS:
             medium.close()
@@ -131,7 +131,7 @@ def find_steps(snapshot: Snapshot) -> int:
 
     def find() -> int:
         with snapshot.source.open() as medium:
-            return steps_for(medium, smooth, window, skip_repeats=skip_repeats)
+            return features.needed("steps_for")(medium, smooth, window, skip_repeats=skip_repeats)
 
     return 1 if smooth == 1 else _steps.ask(key, find, _KEPT)
 
@@ -139,7 +139,8 @@ def find_steps(snapshot: Snapshot) -> int:
 def steps_key(snapshot: Snapshot) -> tuple:
     """Return what the steps depend on."""
     options = _options(snapshot)
-    return snapshot.source.key, options.step, options.window, options.skip_repeats
+    step = options.step if any(features.each("SmoothSource")) else 1
+    return snapshot.source.key, step, options.window, options.skip_repeats
 
 
 def _options(snapshot: Snapshot) -> Options:

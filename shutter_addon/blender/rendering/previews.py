@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 
 from bpy.types import Context, Scene
 
+from ... import features
 from ...compute.renderer import Renderer
 from ...compute.request import Request
 from ...core.frames.frame_source import FrameSource
@@ -20,7 +21,7 @@ from ...media.reduced import DIVISORS
 from ..data import annotations, preview_areas, selection, strips
 from ..data.preview_areas import Look, Shown
 from ..data.snapshot import Snapshot
-from . import effect_source, invalidation, render_job, sessions, smooth_previews
+from . import effect_source, invalidation, render_job, sessions
 from .session import RenderContext
 
 # Operators that read the sequencer's pictures from the window.
@@ -176,7 +177,7 @@ def _look(context: Context, shown: Shown) -> Look:
 def _decide(context: Context, shown: Shown, look: Look, snapshot: Snapshot) -> Decision:
     render = sessions.of_drawing()
     request = _requested(context, render, shown, snapshot, look)
-    is_plain = smooth_previews.comes(snapshot.scene)
+    is_plain = any(comes(snapshot.scene) for comes in features.each("smooth_comes"))
     is_drawn = _is_drawn(context, shown, look, render.renderer(request).source, is_less=is_plain or is_going(context))
     return Decision(snapshot, shown.scene.frame_current, request, is_drawn, is_plain)
 
@@ -205,10 +206,16 @@ def _best(
     context: Context, render: RenderContext, snapshot: Snapshot, frame: float, detail: effect_source.Detail
 ) -> Request:
     """Return the picture in a detail, or the plain one where the smooth one is not ready."""
-    if is_read(context) or not detail.smooth:
-        smooth_previews.rest()
-        return render.request(snapshot, frame, detail)
-    return smooth_previews.chosen(render, snapshot, frame, detail)
+    if not is_read(context) and detail.smooth:
+        for smooth_request in features.each("smooth_request"):
+            return smooth_request(render, snapshot, frame, detail)
+    _rest_smooth()
+    return render.request(snapshot, frame, detail)
+
+
+def _rest_smooth() -> None:
+    for rest_smooth in features.each("rest_smooth"):
+        rest_smooth()
 
 
 def _detail(context: Context, look: Look) -> effect_source.Detail:
@@ -281,9 +288,10 @@ def _time_up(context: Context, key: tuple) -> Slice:
 def refine() -> None:
     """Go on with the smooth pictures behind those drawn. One of effect_source.FAULTS: there is none."""
     if pen_is_down():
-        smooth_previews.rest()
+        _rest_smooth()
     elif looking.slices.last is None:
-        smooth_previews.advance(_SLICE)
+        for advance_smooth in features.each("advance_smooth"):
+            advance_smooth(_SLICE)
 
 
 def show_carried() -> None:

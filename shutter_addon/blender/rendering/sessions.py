@@ -9,9 +9,11 @@ from collections.abc import Callable
 
 import bpy
 
+from ... import features
+from ...core.model.mattes import MatteFile
 from ...core.pixels.shown_levels import Display
 from ..devices import available, main_thread
-from . import outline_carrying, render_job, render_settings, smooth_previews
+from . import render_job, render_settings
 from .render_job import Where
 from .session import RenderContext, RenderSession
 
@@ -30,11 +32,16 @@ def _ask_offscreen() -> None:
         OFFSCREEN.free()
 
 
+def _want_matte(file: MatteFile, frame: int) -> None:
+    """Have a matte made that a preview misses."""
+    features.needed("want_matte")(file, frame)
+
+
 # The window's pictures are made on its main thread and GPU. Renders have another device with a thread, because another
 # GL context cannot always be current beside Blender's (see GLDevice). In the background, Blender's GPU belongs to the
 # main thread.
 OFFSCREEN = RenderSession(lambda: available.choose(render_settings.wanted()), _ask_window)
-WINDOW = RenderSession(lambda: ("blender", None), _ask_offscreen, outline_carrying.want)
+WINDOW = RenderSession(lambda: ("blender", None), _ask_offscreen, _want_matte)
 # For a thread that the window waits for, where OFFSCREEN would need the window's GPU.
 WAITED_FOR = RenderSession(lambda: available.choose(render_settings.wanted(), window_waits=True), lambda: None)
 SESSIONS = OFFSCREEN, WINDOW, WAITED_FOR
@@ -85,7 +92,7 @@ def drop_removed() -> None:
 
 def forget(*_: object) -> None:
     """Close all sources and free the devices, when a file is loaded or the extension is disabled."""
-    outline_carrying.forget()
-    smooth_previews.forget()
+    for forget_pictures in features.each("forget_pictures"):
+        forget_pictures()
     for session in SESSIONS:
         session.forget()

@@ -171,3 +171,16 @@ def _lines(length: int, step: int) -> Taps:
     place = (np.arange(length)[:, None] + 0.5) / step + 0.5
     indices = np.floor(place).astype(int) + np.arange(2)
     return indices, 1 - np.abs(place - indices)
+
+
+Box = tuple[slice, slice]  # rows and columns
+
+
+def box_around(cover: np.ndarray, reach: int) -> Box | None:
+    """The rows and columns within reach, in pixels, of what a matte (h, w) covers; None: it covers nothing."""
+    places = [np.flatnonzero(cover.max(axis=axis) > 0) for axis in (1, 0)]
+    if not places[0].size:
+        return None
+    low = [max(int(each[0]) - reach, 0) for each in places]
+    high = [min(int(each[-1]) + 1 + reach, length) for each, length in zip(places, cover.shape, strict=True)]
+    return slice(low[0], high[0]), slice(low[1], high[1])

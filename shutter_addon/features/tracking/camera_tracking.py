@@ -13,11 +13,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core.model import scribbles
-from ..core.model.effect import Region, Subject
-from ..core.model.motions import Motion, Placement, Similarity
+from ...core.model import scribbles
+from ...core.model.effect import Region, Subject
+from ...core.model.motions import Motion, Placement, Similarity
+from ...media.footage import Footage
 from . import part_tracking, registration, tracking
-from .footage import Footage
 from .part_tracking import FoundMotion
 from .registration import Part
 from .tracking import Tracked, TrackingError

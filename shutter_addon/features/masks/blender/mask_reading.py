@@ -12,15 +12,15 @@ import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 from numpy.typing import ArrayLike
 
-from ...core.messages import EffectError
-from ...core.model.masks import MaskLayer, MaskShape, MaskSpline
-from . import fcurves
-from .struct_dna import LayoutError, read, record
+from ....blender.data import fcurves
+from ....blender.data.struct_dna import LayoutError, read, record
+from ....core.messages import EffectError
+from ....core.model.masks import MaskLayer, MaskShape, MaskSpline
 
 _FARTHEST = 1e4  # of coordinates, in pictures
 
 
-def still(mask: bpy.types.Mask) -> MaskShape:
+def still_mask(mask: bpy.types.Mask) -> MaskShape:
     """Return a mask that does not move. EffectError: it does, or a number is not usable."""
     points = (point for layer in mask.layers for spline in layer.splines for point in spline.points)
     is_keyed = fcurves.curves_under(mask, "") or any(map(_has_shape_keys, mask.layers))

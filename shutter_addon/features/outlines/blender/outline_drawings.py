@@ -8,24 +8,21 @@ from functools import lru_cache
 
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.types import Mask, PropertyGroup, Scene, Strip
+from bpy.types import PropertyGroup, Scene, Strip
 
-from ...core import revision
-from ...core.messages import EffectError
-from ...core.model import outlines, scribbles
-from ...core.model.masks import MaskShape
-from ...core.model.scribbles import mapped
-from ...media import carrying, flow, outlining
-from ...media.carried_mattes import CarriedMattes
-from ...media.subject_mattes import CarriedFile
-from ..data import annotations, mask_reading, snapshot, strips
-from ..data.annotations import layer_of
-from ..rendering import effect_source
-from . import region_edits
+from ....blender.data import snapshot, strips
+from ....blender.data.annotations import layer_of
+from ....blender.editing import region_edits
+from ....blender.rendering import effect_source
+from ....core import revision
+from ....core.messages import EffectError
+from ....core.model import outlines, scribbles
+from ....media import flow, outlining
+from .. import carrying
+from ..carried_mattes import CarriedMattes
+from ..subject_mattes import CarriedFile
 
-Strokes = outlines.Curves | list[np.ndarray]  # each (n, 2), in fractions of the picture
 SURE_SUBJECT = 0.5  # a more confident frame of a subject needs no correction
-_EVEN = 1e-5  # what an even motion of a mask may change from frame to frame, in pictures
 SURE = 0.75  # a more confident frame needs no drawing: its overlap is usually 90 %
 
 
@@ -54,28 +51,6 @@ def shown_curves(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) 
     """Return `curves_now` for drawing code. The result is kept until something changes."""
     key = effect.scene.session_uid, strip.name, index, scene.frame_current
     return revision.until_change("outline", key, lambda: curves_now(scene, effect, strip, index))
-
-
-def draw(effect: PropertyGroup, strip: Strip, region: PropertyGroup, curves: Strokes, frame: int) -> None:
-    """Make curves the drawing of a region at a timeline frame.
-
-    Args:
-        curves: in fractions of the picture.
-
-    Raises:
-        EffectError: the strip has a scale of 0.
-    """
-    to_image = annotations.picture_to_image(strip, annotations.picture_size(effect))
-    if not annotations.is_invertible(to_image):
-        raise EffectError(rpt_('strip "{strip}" has a scale of 0').format(strip=strip.name))
-    name = "outline_layer" if region.kind == "SUBJECT" else "layer"
-    layer = layer_of(effect, region, name) or region_edits.new_layer(effect, region, name)
-    for drawing in [drawing for drawing in layer.frames if drawing.frame_number == frame]:
-        layer.frames.remove(drawing)
-    drawing = layer.frames.new(frame)
-    for points in curves:
-        annotations.add_stroke(drawing, mapped(to_image, np.asarray(points)))
-    revision.changed()  # Blender does not report new strokes
 
 
 def picture_now(scene: Scene, effect: PropertyGroup, strip: Strip) -> np.ndarray:
@@ -125,7 +100,7 @@ def outline_it(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) ->
         layer = layer_of(effect, region)
         for drawing in list(layer.frames):
             layer.frames.remove(drawing)
-    draw(effect, strip, region, curves, frame)
+    region_edits.draw_curves(effect, strip, region, curves, frame)
     return True
 
 
@@ -161,38 +136,3 @@ def next_needed(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -
         return None, enough
     worst = sorted(frame for frame, share in sure.items() if share == least)
     return worst[len(worst) // 2], least
-
-
-def from_mask(scene: Scene, effect: PropertyGroup, strip: Strip, shutter: PropertyGroup, mask: Mask) -> PropertyGroup:
-    """Add a region: an outline with drawings where a mask's motion changes.
-
-    Raises:
-        EffectError, MediaError: the mask cannot be read, encloses nothing in the strip, or OpenCV is missing.
-    """
-    size = annotations.picture_size(effect)
-    shown = snapshot.source_frames(scene, effect, strip, range(strip.left_handle, strip.right_handle))
-    masks = mask_reading.at_frames(mask, [mask.frame_start + number for number in shown.values()])
-    drawn = _where_motion_changes(dict(zip(map(int, shown), masks, strict=True)))
-    shapes = {frame: outlining.traced(shape.values(*size)) for frame, shape in drawn.items()}
-    if not any(shapes.values()):
-        raise EffectError(rpt_('mask "{mask}" encloses nothing in the strip').format(mask=mask.name))
-    region = region_edits.add_region(effect, shutter, "OUTLINE", mask.name)
-    region.motion, region.between = "LOCATION", "STRAIGHT"
-    ordered = outlines.in_order(shapes.values(), size[0] / size[1])
-    for frame, curves in zip(shapes, ordered, strict=True):
-        draw(effect, strip, region, curves, frame)
-    return region
-
-
-def _where_motion_changes(shapes: dict[int, MaskShape]) -> dict[int, MaskShape]:
-    """Return those of a mask's shapes by frame between which it moves evenly."""
-    steps = np.diff(np.array([_numbers(shape) for shape in shapes.values()]), axis=0)
-    changes = np.abs(np.diff(steps, axis=0, prepend=1, append=0)).max(axis=1, initial=0)
-    return {frame: shape for (frame, shape), change in zip(shapes.items(), changes, strict=True) if change > _EVEN}
-
-
-def _numbers(shape: MaskShape) -> np.ndarray:
-    """Return the numbers of a mask that may move."""
-    splines = [spline for layer in shape.layers for spline in layer.splines]
-    moving = [np.concatenate([np.ravel(spline.points), spline.weights]) for spline in splines]
-    return np.concatenate([[layer.alpha for layer in shape.layers], *moving])

@@ -20,10 +20,11 @@ from itertools import product
 
 import numpy as np
 
-from ..core import stopping
-from ..core.frames.light import to_linear
-from . import flow
-from .opencv import cv2
+from ...core import stopping
+from ...core.frames.light import to_linear
+from ...core.pixels.matte_grid import Box, box_around
+from ...media import flow
+from ...media.opencv import cv2
 
 WORKING = 512
 SLIM = 4  # pixels of a side that the working picture keeps: so many as a picture has at least that Blender renders
@@ -102,7 +103,7 @@ def carried(frames: Frames, first: Drawing | None, last: Drawing | None, span: r
         stopping.check()
         places = [footage.best(joined.pop((end.frame, frame)), frame, end) for end in ends]
         covers = [_at(end.cover, there) for end, there in zip(ends, places, strict=True)]
-        box = box_around(np.maximum.reduce(covers))
+        box = box_around(np.maximum.reduce(covers), REACH)
         sides = [
             _votes(footage.colors[frame], _at(footage.colors[end.frame], there), cover, box)
             for end, there, cover in zip(ends, places, covers, strict=True)
@@ -122,7 +123,7 @@ def drawn(picture: np.ndarray, cover: np.ndarray) -> np.ndarray:
 
     picture: (H, W, 3) uint8; cover: see Drawing"""
     shown = lab(flow.resized(picture, cover.shape[::-1]))
-    return flow.levels(refined(picture, _mixed([_votes(shown, shown, cover, box_around(cover))], [1.0])))
+    return flow.levels(refined(picture, _mixed([_votes(shown, shown, cover, box_around(cover, REACH))], [1.0])))
 
 
 @dataclass(frozen=True)
@@ -212,7 +213,6 @@ def _joined(
     return places
 
 
-Box = tuple[slice, slice]  # rows and columns
 Votes = tuple[np.ndarray, np.ndarray]  # (h, w) each: the sum of those for a pixel's lying inside, and that of all
 
 
@@ -241,16 +241,6 @@ def _votes(shown: np.ndarray, colors: np.ndarray, cover: np.ndarray, box: Box | 
         total[rows, columns] += weight
         inside[rows, columns] += weight * covers[place]
     return inside, total
-
-
-def box_around(cover: np.ndarray, reach: int = REACH) -> Box | None:
-    """The rows and columns within reach, in pixels, of what a matte (h, w) covers; None: it covers nothing."""
-    places = [np.flatnonzero(cover.max(axis=axis) > 0) for axis in (1, 0)]
-    if not places[0].size:
-        return None
-    low = [max(int(each[0]) - reach, 0) for each in places]
-    high = [min(int(each[-1]) + 1 + reach, length) for each, length in zip(places, cover.shape, strict=True)]
-    return slice(low[0], high[0]), slice(low[1], high[1])
 
 
 def _mixed(sides: list[Votes], weights: list[float]) -> np.ndarray:

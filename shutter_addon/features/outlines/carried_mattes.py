@@ -18,17 +18,17 @@ from threading import Lock
 import numpy as np
 from OpenImageIO import ImageSpec
 
-from ..core import stopping
-from ..core.farm.claims import Claims
-from ..core.frames.frame_source import FrameSource, SourceWrapper
-from ..core.messages import MediaError
-from ..core.model import outlines, scribbles
-from . import carrying, derived, flow
-from .cuts import ShotSource
-from .image_writing import write_levels
-from .outlining import traced
+from ...core import stopping
+from ...core.farm.claims import Claims
+from ...core.frames.frame_source import FrameSource, SourceWrapper
+from ...core.messages import MediaError
+from ...core.model import outlines, scribbles
+from ...media import derived, flow
+from ...media.cuts import ShotSource
+from ...media.image_writing import write_levels
+from ...media.outlining import traced
+from . import carrying
 
-FOLDER = "virtual_shutter_mattes"
 CONFIDENCE = "confidence "  # what a file's description says (carrying.Carried)
 VERSION = 4  # raise it when mattes of the same drawings change
 TRUSTED = 0.2  # confidence below which a drawing is carried no farther
@@ -240,7 +240,7 @@ _MAKING = Lock()  # or two threads would each make a folder
 def _temporary() -> tempfile.TemporaryDirectory:
     """Return a folder that is there until this program ends. MediaError: it cannot be made."""
     try:
-        return tempfile.TemporaryDirectory(prefix=FOLDER, ignore_cleanup_errors=True)
+        return tempfile.TemporaryDirectory(prefix=derived.MATTES, ignore_cleanup_errors=True)
     except OSError as error:
         raise MediaError(f"mattes cannot be written anywhere ({error.strerror or error})") from None
 

@@ -13,8 +13,8 @@ from typing import get_args
 
 import numpy as np
 
-from ..core.model.motions import Motion, Similarity
-from .opencv import cv2
+from ...core.model.motions import Motion, Similarity
+from ...media.opencv import cv2
 
 # What may change, from only the location to location, rotation and scale.
 MOTIONS = get_args(Motion)

@@ -11,13 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from ..core import stopping
-from ..core.messages import MediaError, of_file
-from ..core.model import scribbles
-from . import carrying, flow
-from .opencv import cv2
+from ...core import stopping
+from ...core.messages import MediaError, of_file
+from ...core.model import scribbles
+from ...core.pixels.matte_grid import Box, box_around
+from ...media import flow
+from ...media.opencv import cv2
+from . import carrying
 
-MODEL = Path(__file__).resolve().parents[2] / "models" / "u2netp.onnx"
 MEAN, DEVIATION = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)  # of the colors that such networks are trained with
 MULTIPLE, LEAST = 32, 5  # the network halves its picture five times: sides are multiples of that, five at least
 QUICK = 0.8  # share of the network's own size that is enough where it is known how the subject looked a frame before
@@ -103,7 +104,7 @@ class Network:
         mask = (mask - mask.min()) / max(float(np.ptp(mask)), 1e-6)
         return np.clip(cv2.resize(mask, picture.shape[1::-1], interpolation=cv2.INTER_LINEAR), 0, 1)
 
-    def within(self, picture: np.ndarray, box: carrying.Box, share: float = 1.0) -> np.ndarray:
+    def within(self, picture: np.ndarray, box: Box, share: float = 1.0) -> np.ndarray:
         """Return its answer on a part of a picture; nothing elsewhere."""
         found = np.zeros(picture.shape[:2], np.float32)
         found[box] = self.answer(np.ascontiguousarray(picture[box]), share)
@@ -149,7 +150,7 @@ def found(network: Network, picture: np.ndarray, on: np.ndarray, off: np.ndarray
     return without(Found(share, np.zeros_like(share), _confidence(share, sure)), picture, on, off)
 
 
-def _sure(share: np.ndarray, on: np.ndarray, box: carrying.Box) -> float:
+def _sure(share: np.ndarray, on: np.ndarray, box: Box) -> float:
     """Return how sure the network is of a part, 0 to 1; 0 if no subject is under strokes, less if the box cuts it."""
     inside = share > INSIDE
     if inside[on].mean() < TOUCHED or inside.mean() > LARGEST:
@@ -246,10 +247,10 @@ def followed(network: Network, before: np.ndarray, picture: np.ndarray, subject:
     return Found(share, excluded, confidence), still
 
 
-def around(where: np.ndarray, room: float) -> carrying.Box:
+def around(where: np.ndarray, room: float) -> Box:
     """Return the box around an area (h, w), with room on each side: a share of its longest one."""
     area = where.astype(np.float32)
-    tight = carrying.box_around(area, reach=0)
+    tight = box_around(area, reach=0)
     assert tight is not None
     reach = max(round(room * max(part.stop - part.start for part in tight)), LEAST_ROOM)
-    return carrying.box_around(area, reach) or tight
+    return box_around(area, reach) or tight

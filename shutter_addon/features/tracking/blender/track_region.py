@@ -7,68 +7,29 @@ At the end, only keyframes that the motion needs within a pixel remain.
 import math
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
-import bpy
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import PropertyGroup, Scene, Strip
 
-from ...core import revision, threads
-from ...core.frames import frame_ranges
-from ...core.messages import EffectError, translated
-from ...core.model import limits, presence
-from ...core.model.effect import Camera, Region
-from ...core.model.frame_state import Options
-from ...core.model.keyframes import Samples
-from ...media import camera_tracking, matte_tracking, part_tracking, tracking
-from ...media.footage import Footage
-from ...media.tracking import Tracked
-from ..data import selection, snapshot, strips, validation
-from ..data.sampled import placement_now
-from ..rendering import effect_source
-from . import motion_keys
-from .motion_keys import MotionKeys
-
-_replaced = revision.Revision()  # of Blender's data, by undo or another file
-
-
-def data_replaced() -> None:
-    """End all tracking without another keyframe, because its data is gone."""
-    _replaced.changed()
-
-
-@dataclass(frozen=True)
-class Target:
-    """What is tracked. It is looked up before each step, because Blender's data may have changed.
-
-    Attributes:
-        scene: session_uid of the effect scene.
-        index: see selection.moving.
-        known: differs if another region has taken its place.
-    """
-
-    scene: int
-    index: Any
-    known: tuple
-
-    @classmethod
-    def of(cls, effect: PropertyGroup, index: int | None) -> "Target":
-        return cls(effect.scene.session_uid, index, cls._known(effect, index))
-
-    def effect(self) -> PropertyGroup | None:
-        """Return the effect; None: it is gone, moved, or undone, or another region has this index."""
-        effects = (effect for scene in bpy.data.scenes for effect in scene.virtual_shutter.effects if effect.scene)
-        effect = next((effect for effect in effects if effect.scene.session_uid == self.scene), None)
-        is_there = effect is not None and (self.index is None or self.index < len(effect.regions))
-        return effect if is_there and self._known(effect, self.index) == self.known else None
-
-    @staticmethod
-    def _known(effect: PropertyGroup, index: int | None) -> tuple:
-        layer = None if index is None else effect.regions[index].layer
-        return _replaced.number, effect.id_data.session_uid, effect.start, layer
+from ....blender.data import selection, snapshot, strips, targets, validation
+from ....blender.data.sampled import placement_now
+from ....blender.editing import motion_keys
+from ....blender.editing.motion_keys import MotionKeys
+from ....blender.rendering import effect_source
+from ....core import threads
+from ....core.frames import frame_ranges
+from ....core.messages import EffectError, translated
+from ....core.model import limits, presence
+from ....core.model.effect import Camera, Region
+from ....core.model.frame_state import Options
+from ....core.model.keyframes import Samples
+from ....media.footage import Footage
+from .. import camera_tracking, matte_tracking, part_tracking, tracking
+from ..tracking import Tracked
 
 
 def frames_to_track(scene: Scene, strip: Strip, direction: str, until: int = 0) -> range:
@@ -125,7 +86,7 @@ def track(
     tracked, stops = {start: here}, []
     before, after = [anchor for anchor in anchors if anchor < start], [anchor for anchor in anchors if anchor > start]
     reach = max(before, default=frames[0]), min(after, default=frames[-1])
-    shown, target = snapshot.take(scene, effect, strip, frames), Target.of(effect, index)
+    shown, target = snapshot.take(scene, effect, strip, frames), targets.Target.of(effect, index)
     del scene, effect, strip, keys, moving  # these may become invalid after the first step
     with effect_source.open_source(shown) as source:
         try:

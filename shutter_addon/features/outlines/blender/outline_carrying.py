@@ -9,12 +9,14 @@ from contextlib import closing
 from dataclasses import dataclass, field
 
 import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...core import stopping, threads
-from ...media.subject_mattes import CarriedFile
-from ..data import preview_areas
-from ..devices import main_thread
-from .effect_source import in_words
+from ....blender.data import preview_areas
+from ....blender.devices import main_thread
+from ....blender.rendering import previews
+from ....blender.rendering.effect_source import in_words
+from ....core import stopping, threads
+from ..subject_mattes import CarriedFile
 
 TICK = 0.25  # seconds between two looks at the thread
 
@@ -74,7 +76,7 @@ class _Mattes:
 _mattes = _Mattes()
 
 
-def want(file: CarriedFile, frame: int) -> None:
+def want_matte(file: CarriedFile, frame: int) -> None:
     """Note the source frame of a matte that a preview misses."""
     if file not in _mattes.failed:
         _mattes.wanted.setdefault(file, set()).add(frame)
@@ -121,6 +123,16 @@ def progress() -> tuple[int, int] | None:
     return (carrying.done, len(carrying.frames)) if carrying else None
 
 
+def note_tracking(say: Callable[[str], None]) -> None:
+    """Track missing mattes of outlines, and add a note on the progress."""
+    fault, made = begin(previews.show_carried), progress()
+    if fault is not None:
+        say(rpt_("Shutter: {fault}").format(fault=fault))
+    if made is not None:
+        done, total = made
+        say(rpt_("Tracking the outline: {done} of {total} frames").format(done=done, total=total))
+
+
 def _look() -> float | None:
     """Show what is made, as a timer."""
     if (carrying := _mattes.carrying) is None:
@@ -149,7 +161,7 @@ def stop() -> None:
         _mattes.carrying = None
 
 
-def forget(*_: object) -> None:
+def forget_pictures() -> None:
     """Stop and forget everything, when a file is loaded or the extension is disabled."""
     stop()
     _mattes.wanted.clear()

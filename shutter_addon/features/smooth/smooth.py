@@ -15,16 +15,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.caches import RecentValues
-from ..core.frames.frame_source import FrameSource, SourceWrapper
-from ..core.frames.planes import Decoded, Moment, as_rgba
-from ..core.messages import MediaError
-from ..core.model.motions import Similarity
-from ..core.model.shutters import MAX_WINDOW
-from . import flow, opencv
-from .cuts import may_be_cut
-from .derived import StoredVectors
-from .files import check_index
+from ...core.caches import RecentValues
+from ...core.frames.frame_source import FrameSource, SourceWrapper
+from ...core.frames.planes import Decoded, Moment, as_rgba
+from ...core.messages import MediaError
+from ...core.model.motions import Similarity
+from ...core.model.shutters import MAX_WINDOW
+from ...media import flow, opencv
+from ...media.cuts import may_be_cut
+from ...media.derived import StoredVectors
+from ...media.files import check_index
 
 SMOOTH = 1, 2, 4, 8, 16  # moments from a filmed frame to the next
 MOST = 4  # equal frames in a row; more are a still shot

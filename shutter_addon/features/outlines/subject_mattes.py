@@ -16,14 +16,16 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..core import stopping
-from ..core.frames.frame_source import FrameSource
-from ..core.model import outlines
-from . import carrying, derived, flow, opencv
+from ...core import stopping
+from ...core.frames.frame_source import FrameSource
+from ...core.model import outlines
+from ...media import derived, flow, opencv
+from ...media.files import MODEL
+from ...media.image_writing import write_levels
+from ...media.opencv import cv2
+from . import carrying
 from .carried_mattes import CONFIDENCE, CarriedMattes, Drawings, nearest
-from .image_writing import write_levels
-from .opencv import cv2
-from .subject import MODEL, WIDTH, Found, Network, covered, followed, found, refined, without
+from .subject import WIDTH, Found, Network, covered, followed, found, refined, without
 
 VERSION = 1  # raise it when mattes of the same strokes change
 EXCLUDED = 1  # the level of what strokes say that the subject is not
@@ -36,7 +38,7 @@ Strokes = Mapping[int, Sequence[Any]]
 
 
 @dataclass(frozen=True)
-class Subject:
+class MarkedSubject:
     """Strokes on a subject, and on what it is not.
 
     Attributes:
@@ -73,7 +75,7 @@ class CarriedFile:
     # Each frame of a window asks for the hash; drawings may have thousands of points.
     drawings: Drawings = field(hash=False)
     folder: Path | None = None
-    subject: Subject | None = None
+    subject: MarkedSubject | None = None
     model: Path = MODEL
 
     def open(self) -> CarriedMattes:
@@ -88,7 +90,7 @@ class SubjectMattes(CarriedMattes):
     """The mattes of a subject; see CarriedMattes."""
 
     def __init__(
-        self, source: FrameSource, drawings: Drawings, folder: Path | None, subject: Subject, model: Path
+        self, source: FrameSource, drawings: Drawings, folder: Path | None, subject: MarkedSubject, model: Path
     ) -> None:
         super().__init__(source, drawings, folder)
         self._subject, self._model, self._digest = subject, model, derived.content_digest(model, whole=1 << 40).hex()

@@ -11,15 +11,15 @@ import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import MovieClip, MovieTrackingTrack, PropertyGroup, Scene, Strip
 
-from ...core.messages import EffectError, translated
-from ...core.model import motions
-from ...core.model.effect import Region
-from ...core.model.motions import Placement, Similarity
-from ...media import registration
-from ..data import annotations, external_files, fcurves, snapshot, source_media, strips, validation
-from ..rendering import effect_source
-from . import motion_keys
-from .motion_keys import MotionKeys
+from ....blender.data import annotations, external_files, fcurves, snapshot, source_media, strips, validation
+from ....blender.editing import motion_keys
+from ....blender.editing.motion_keys import MotionKeys
+from ....blender.rendering import effect_source
+from ....core.messages import EffectError, translated
+from ....core.model import motions
+from ....core.model.effect import Region
+from ....core.model.motions import Placement, Similarity
+from .. import registration
 
 Motions = dict[int, Similarity]  # motion of the picture to each frame
 Points = dict[str, complex]  # positions of markers in pixels, as in motions.Similarity

@@ -6,6 +6,7 @@ measures this when the interface calls `advance`; drawing only asks for what is 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from concurrent.futures import Future, wait
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -14,19 +15,25 @@ import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import PropertyGroup
 
-from ...compute.renderer import Renderer
-from ...compute.request import Request
-from ...core import threads
-from ...core.caches import RecentValues
-from ...core.model import windows
-from ...core.model.frame_state import FrameState
-from ...core.model.motions import Similarity
-from ...media import MediaError, opencv, smooth
-from ..data.snapshot import Snapshot
-from ..data.source_media import SourceSpec
+from ....blender.data import preview_areas
+from ....blender.data.snapshot import Snapshot
+from ....blender.data.source_media import SourceSpec
+from ....blender.devices import main_thread
+from ....compute.renderer import Renderer
+from ....compute.request import Request
+from ....core import threads
+from ....core.caches import RecentValues
+from ....core.model import windows
+from ....core.model.frame_state import FrameState
+from ....core.model.motions import Similarity
+from ....media import MediaError, opencv
+from .. import smooth
 
 _KEPT = 64  # pairs of frames whose motion is kept, half a megabyte each
 _TRIED = 4  # pairs around the shown frame, until the motion of one can be found
+
+_TICK = 0.25  # seconds between two looks at the thread
+_STILL = 0.4  # seconds after which a frame counts as still
 
 _NEVER = None, None, False
 
@@ -135,6 +142,27 @@ def advance() -> bool:
     if _measuring.wanted is not None:
         _measuring.job, _measuring.wanted = threads.start(_measure_motion, *_measuring.wanted), None
     return ended
+
+
+def note_streaks(
+    effect: PropertyGroup, snapshot: Snapshot, renderer: Renderer, request: Request, say: Callable[[str], None]
+) -> None:
+    """Add a note to a preview if too few frames are exposed."""
+    known, is_new = look(effect, snapshot, renderer, request)
+    if known is not None:
+        say(too_few_frames(known))
+    if is_new:
+        main_thread.later(preview_areas.redraw_panels)  # panels may have been drawn before
+    if is_busy():
+        main_thread.drop(_measure)
+        main_thread.later(_measure, _STILL)  # when the frame stays
+
+
+def _measure() -> float | None:
+    """Measure motion, a little at a time."""
+    if advance():
+        preview_areas.redraw()
+    return _TICK if is_busy() else None
 
 
 def too_few_frames(step: float) -> str:

@@ -11,14 +11,14 @@ import time
 from concurrent.futures import Future, wait
 from dataclasses import dataclass, field, replace
 
-from ...compute.request import Request
-from ...core import stopping, threads
-from ...core.stopping import Slices, StoppedError
-from ..data import preview_areas
-from ..data.snapshot import Snapshot
-from ..devices import main_thread
-from .effect_source import FAULTS, Detail, SourceKey, find_steps, known_steps, steps_key
-from .session import RenderContext
+from ....blender.data import preview_areas
+from ....blender.data.snapshot import Snapshot
+from ....blender.devices import main_thread
+from ....blender.rendering.effect_source import FAULTS, Detail, SourceKey, find_steps, known_steps, steps_key
+from ....blender.rendering.session import RenderContext
+from ....compute.request import Request
+from ....core import stopping, threads
+from ....core.stopping import Slices, StoppedError
 
 _WAIT = 0.1  # seconds between two looks at whether moments are ready
 _UNSEEN = 5.0  # seconds without a request after which a picture is dropped
@@ -102,7 +102,7 @@ class _Coming:
 _coming: dict[int, _Coming] = {}  # by effect scene
 
 
-def chosen(render: RenderContext, snapshot: Snapshot, frame: float, detail: Detail) -> Request:
+def smooth_request(render: RenderContext, snapshot: Snapshot, frame: float, detail: Detail) -> Request:
     """Return the smooth request if its picture is ready, else the plain one.
 
     Raises:
@@ -129,17 +129,17 @@ def chosen(render: RenderContext, snapshot: Snapshot, frame: float, detail: Deta
     return plain
 
 
-def comes(scene: int) -> bool:
+def smooth_comes(scene: int) -> bool:
     """Tell whether a smooth picture of an effect scene is being made."""
     return scene in _coming and not _coming[scene].is_over
 
 
 def is_busy() -> bool:
     """Tell whether any smooth picture is being made."""
-    return any(map(comes, _coming))
+    return any(map(smooth_comes, _coming))
 
 
-def advance(seconds: float) -> None:
+def advance_smooth(seconds: float) -> None:
     """Compose the smooth pictures whose plain ones were drawn, for some seconds each.
 
     Raises:
@@ -163,13 +163,13 @@ def advance(seconds: float) -> None:
                 raise
 
 
-def rest() -> None:
+def rest_smooth() -> None:
     """Stop making smooth pictures."""
     while _coming:
         _coming.popitem()[1].rest()
 
 
-def forget() -> None:
+def forget_pictures() -> None:
     """Wait for threads, and forget everything: when a file is loaded or the extension is disabled."""
     wait([coming.steps for coming in _coming.values() if coming.steps is not None])
     _coming.clear()

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.model.motions import Motion, Similarity
+from ...core.model.motions import Motion, Similarity
+from ...media.footage import Footage
 from . import registration
-from .footage import Footage
 from .registration import Match, Part
 
 COVERED = "the subject is covered, or looks too different"

@@ -5,9 +5,10 @@ from contextlib import closing
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import PropertyGroup, Scene, Strip
 
-from ...core.messages import EffectError
-from ..data import annotations, snapshot
-from . import outline_drawings, region_edits
+from ....blender.data import annotations, snapshot
+from ....blender.editing import region_edits
+from ....core.messages import EffectError
+from . import outline_drawings
 
 
 def find(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> bool:
@@ -71,5 +72,5 @@ def to_outline(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) ->
     region_edits.remove_layers(effect, region)
     region.kind = "OUTLINE"
     for frame, drawn in curves.items():
-        outline_drawings.draw(effect, strip, region, drawn, frame)
+        region_edits.draw_curves(effect, strip, region, drawn, frame)
     return True

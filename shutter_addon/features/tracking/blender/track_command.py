@@ -6,24 +6,24 @@ from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any
 
-from ...core import atomic_write
-from ...core.frames.frame_source import FrameSource
-from ...core.model import outlines, presence
-from ...core.model.clip import Clip
-from ...core.model.effect import Camera, Effect, OutlineRegion, Region, SubjectRegion
-from ...core.model.scribbles import Drawings
-from ...core.recipes import recipe, recipe_file, region_keys
-from ...media import PrefetchSource, camera_tracking, matte_tracking, registration, tracking
-from ...media.cuts import ShotSource
-from ...media.footage import Footage
-from ...media.smooth import SmoothSource, steps_for
-from ...media.subject_mattes import CarriedFile, Subject
-from ..data import preferences
-from ..data.source_media import SourceSpec
-from ..editing import whole_edits
-from ..output import film_output
-from ..rendering import render_job
-from . import command_line
+from .... import features
+from ....blender.commands import command_line
+from ....blender.data import preferences
+from ....blender.data.source_media import SourceSpec
+from ....blender.editing import whole_edits
+from ....blender.output import film_output
+from ....blender.rendering import render_job
+from ....core import atomic_write
+from ....core.frames.frame_source import FrameSource
+from ....core.model import outlines, presence
+from ....core.model.clip import Clip
+from ....core.model.effect import Camera, Effect, OutlineRegion, Region, SubjectRegion
+from ....core.model.scribbles import Drawings
+from ....core.recipes import recipe, recipe_file, region_keys
+from ....media import PrefetchSource
+from ....media.cuts import ShotSource
+from ....media.footage import Footage
+from .. import camera_tracking, matte_tracking, registration, tracking
 
 HELP = "follow what a region covers, or the camera"
 
@@ -99,9 +99,9 @@ def _followed(
     effect = source_recipe.for_picture(medium.width / medium.height)
     subject: Any = effect.camera if index is None else effect.regions[index]
     options = source_recipe.options.at(1)
-    step = steps_for(medium, options.step, options.window, skip_repeats=options.skip_repeats)
+    step = features.needed("steps_for")(medium, options.step, options.window, skip_repeats=options.skip_repeats)
     with ExitStack() as ends:
-        moments = medium if step == 1 else SmoothSource(medium, step)
+        moments = medium if step == 1 else features.needed("SmoothSource")(medium, step)
         shots = ends.enter_context(ShotSource(PrefetchSource(moments), step))
         moved = ends.enter_context(film_output.progress(len(frames), "frame"))
         clip = Clip.of(shots, source_recipe.time)
@@ -139,9 +139,11 @@ def _cover(
 
     drawings, subject = region.drawings, None
     if isinstance(region, SubjectRegion):
-        drawings, subject = region.outlines, Subject(strokes=curves(region.drawings), nots=curves(region.nots))
+        drawings = region.outlines
+        subject = features.needed("MarkedSubject")(strokes=curves(region.drawings), nots=curves(region.nots))
     footage = SourceSpec(key=(), path=arguments.source, files=None, options={})
-    file = CarriedFile(footage, tuple(sorted(curves(drawings).items())), None, subject, preferences.model())
+    drawn = tuple(sorted(curves(drawings).items()))
+    file = features.needed("CarriedFile")(footage, drawn, None, subject, preferences.model())
     return matte_tracking.cover_of(ends.enter_context(file.open()), filmed)
 
 

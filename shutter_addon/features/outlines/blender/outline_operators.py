@@ -7,17 +7,19 @@ import numpy as np
 from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.types import Context, Event, Gizmo, GizmoGroup, Operator, PropertyGroup, Strip
+from bpy.types import Context, Event, Gizmo, GizmoGroup, Operator, PropertyGroup, Scene, Strip, UILayout
 
-from ...core.messages import UserError
-from ...core.model import outlines
-from ..data import selection, strips
-from ..editing import outline_drawings, subjects, track_region
-from ..rendering import outline_carrying, previews
-from . import drawing, needs
-from .gizmo_groups import Dragged, View, WithKeys, view
-from .operator_bases import Beside, OfEffect, operator, redraw, report, show_status
-from .region_gizmo import SHUTTER_GGT_region
+from ....blender.data import selection, strips, targets
+from ....blender.editing import region_edits
+from ....blender.interface import drawing, needs
+from ....blender.interface.gizmo_groups import Dragged, View, WithKeys, view
+from ....blender.interface.operator_bases import Beside, OfEffect, operator, popup, redraw, report, show_status
+from ....blender.interface.region_gizmo import SHUTTER_GGT_region
+from ....blender.rendering import previews
+from ....blender.rendering.effect_source import FAULTS
+from ....core.messages import UserError
+from ....core.model import outlines
+from . import outline_carrying, outline_drawings, subjects
 
 _COLOR = (0.2, 0.9, 1.0, 0.9)
 _NEAR = 6  # interface units from the pointer to a curve that it can grab
@@ -35,7 +37,7 @@ class SHUTTER_OT_outline_needed(Beside, OfEffect, Operator):
 
     def begin(self, context: Context, waits: bool) -> set[str] | None:
         scene, effect, strip = selection.active(context)
-        self._target = track_region.Target.of(effect, effect.active_region)
+        self._target = targets.Target.of(effect, effect.active_region)
         file, shown = outline_drawings.carried_frames(scene, effect, strip, effect.active_region)
         with closing(file.open()) as mattes:
             frames = sorted({number for number in shown.values() if not mattes.has(number)})
@@ -86,7 +88,7 @@ def outline_draw(self: Operator, _context: Context, effect: PropertyGroup) -> se
     if not curves:
         report(self, rpt_("The outline is empty at the current frame"))
         return {"CANCELLED"}
-    outline_drawings.draw(effect, strip, effect.regions[index], curves, scene.frame_current)
+    region_edits.draw_curves(effect, strip, effect.regions[index], curves, scene.frame_current)
     return None
 
 
@@ -123,6 +125,28 @@ def subject_outline(self: Operator, _context: Context, effect: PropertyGroup) ->
     return None
 
 
+def after_stroke(context: Context, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
+    """Look for a subject under the first stroke of a new effect; the pen draws on the subject from now on."""
+    if not subjects.is_first_stroke(effect, effect.regions[effect.active_region]):
+        return
+    try:
+        is_found = subjects.find(scene, effect, strip, effect.active_region)
+    except (*FAULTS, UserError) as error:
+        popup(context, str(error), icon="ERROR")
+        return
+    if is_found:
+        bpy.ops.ed.undo_push(message=iface_("Find Subject", contexts.operator_default))
+        redraw(context)
+
+
+def draw_new(layout: UILayout) -> None:
+    """Draw the menu's entries for new subjects and outlines."""
+    subject = layout.operator("shutter.draw", text="Draw Subject", icon="OUTLINER_OB_ARMATURE")
+    subject.new, subject.kind = True, "SUBJECT"
+    outline = layout.operator("shutter.draw", text="Draw Outline", icon="CURVE_BEZCIRCLE")
+    outline.new, outline.kind = True, "OUTLINE"
+
+
 class SHUTTER_GT_outline(Dragged, Gizmo):
     """The curves of the active outline in a preview. Dragging corrects them and makes the frame a drawing."""
 
@@ -153,7 +177,7 @@ class SHUTTER_GT_outline(Dragged, Gizmo):
     def grab(self, context: Context, event: Event, seen: tuple[outlines.Curves, View]) -> None:
         curves, seen_as = seen
         scene, effect, strip = selection.in_picture(context)
-        self.target, self.frame = track_region.Target.of(effect, effect.active_region), scene.frame_current
+        self.target, self.frame = targets.Target.of(effect, effect.active_region), scene.frame_current
         self.strip, self.curves, self.by, self.reach = strip.name, curves, (0.0, 0.0), _REACH
         self.aspect = seen_as.aspect
         self.grabbed = tuple(seen_as.on_picture(event.mouse_region_x, event.mouse_region_y))
@@ -181,7 +205,7 @@ class SHUTTER_GT_outline(Dragged, Gizmo):
         if cancel or not any(self.by) or (there := self._there()) is None:
             return
         effect, strip = there
-        outline_drawings.draw(effect, strip, effect.regions[self.target.index], self.mended(), self.frame)
+        region_edits.draw_curves(effect, strip, effect.regions[self.target.index], self.mended(), self.frame)
         context.area.tag_redraw()
         bpy.ops.ed.undo_push(message=iface_("Edit Outline", contexts.operator_default))
 

@@ -12,12 +12,12 @@ from typing import Protocol
 
 import numpy as np
 
-from ..core.messages import MediaError
-from ..core.model import motions, scribbles
-from ..core.model.effect import Region, Subject
-from ..core.model.motions import Motion, Placement, Similarity
+from ...core.messages import MediaError
+from ...core.model import motions, scribbles
+from ...core.model.effect import Region, Subject
+from ...core.model.motions import Motion, Placement, Similarity
+from ...media.footage import Footage
 from . import registration
-from .footage import Footage
 from .part_tracking import FoundMotion, PartTracker, distinctness
 from .registration import Part
 

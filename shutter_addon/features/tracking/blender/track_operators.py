@@ -7,12 +7,14 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import EnumProperty, IntProperty
 from bpy.types import Context, Operator, PropertyGroup
 
-from ...core.model.choices import CONTEXT
-from ..data import selection, validation
-from ..editing import bar_edits, follow_track, motion_keys, outline_drawings, shutter_edits, track_region
-from ..rendering.effect_source import FAULTS
-from . import needs
-from .operator_bases import Beside, OfEffect, given, operator, redraw, report, show_status
+from .... import features
+from ....blender.data import selection, targets, validation
+from ....blender.editing import bar_edits
+from ....blender.interface import needs
+from ....blender.interface.operator_bases import Beside, OfEffect, given, operator, redraw, report, show_status
+from ....blender.rendering.effect_source import FAULTS
+from ....core.model.choices import CONTEXT
+from . import follow_track, track_region, tracked_shots
 
 # Seconds: work between two redraws, at least and at most; waiting for the tracking thread.
 _TICK, _MOST, _PATIENCE = 0.05, 0.1, 0.02
@@ -56,9 +58,9 @@ class _Tracks(Beside):
         scene, effect, strip = selection.active(context)
         index = None if self.is_camera else effect.active_region
         moving = selection.moving(effect, index)
-        self._target, self._start = track_region.Target.of(effect, index), scene.frame_current
+        self._target, self._start = targets.Target.of(effect, index), scene.frame_current
         self._frame, self._done = self._start, set[int]()
-        if self.once and shutter_edits.is_tracked(scene, effect, strip, index):
+        if self.once and tracked_shots.is_tracked(scene, effect, strip, index):
             return self._finish(context)
         self._frames = track_region.frames_to_track(scene, strip, self.direction, moving.track_until)
         options = {"all_keys": moving.track_all_keys, "patience": None if waits else _PATIENCE}
@@ -175,7 +177,7 @@ class SHUTTER_OT_panning_shot(_Tracks, OfEffect, Operator):
     once = True
 
     def ended(self, context: Context) -> None:
-        shutter_edits.panning_shot(self._target.effect(), self._target.index, bar_edits.auto_key(context))
+        tracked_shots.panning_shot(self._target.effect(), self._target.index, bar_edits.auto_key(context))
 
 
 class SHUTTER_OT_tripod(_Tracks, OfEffect, Operator):
@@ -189,7 +191,7 @@ class SHUTTER_OT_tripod(_Tracks, OfEffect, Operator):
     once = True
 
     def ended(self, context: Context) -> None:
-        shutter_edits.tripod(self._target.effect(), bar_edits.auto_key(context))
+        tracked_shots.tripod(self._target.effect(), bar_edits.auto_key(context))
 
 
 _FRAME = given(IntProperty, "Frame", "Timeline frame; without one, the least confident of the next unsure frames")
@@ -200,7 +202,7 @@ def _look(looking: Operator, effect: PropertyGroup, index: int | None) -> set[st
     frame: int | None = looking.frame
     is_given = looking.properties.is_property_set("frame")
     if index is not None and effect.regions[index].kind == "SUBJECT" and not is_given:
-        frame = outline_drawings.next_needed(looking.edit, effect, looking.effect_strip, index)[0]
+        frame = features.needed("next_needed")(looking.edit, effect, looking.effect_strip, index)[0]
     elif not is_given:
         frame = track_region.next_unsure(effect, index, looking.edit.frame_current)
     if frame is None:
@@ -222,12 +224,6 @@ def track_camera_look(self: Operator, _context: Context, effect: PropertyGroup) 
     return _look(self, effect, None)
 
 
-@operator("Insert Region Keyframes", needs.a_region, icon="KEY_HLT")
-def region_key(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
-    """Insert keyframes for location, rotation and scale of the active region at the current frame"""
-    motion_keys.insert(effect, effect.active_region)
-
-
 def _why_no_clip(effect: PropertyGroup) -> str | None:
     has_clip = selection.active_region(effect).follow_clip is not None
     return None if has_clip else rpt_("Choose a clip first")
@@ -237,15 +233,3 @@ def _why_no_clip(effect: PropertyGroup) -> str | None:
 def follow(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Key the active region by a track of a movie clip, from its place at this frame"""
     follow_track.follow(self.edit, effect, self.effect_strip, effect.active_region)
-
-
-@operator("Sharp Subject", needs.a_region)
-def sharp_subject(_self: Operator, context: Context, effect: PropertyGroup) -> None:
-    """Keep the active region sharp in front of a long exposure of everything else"""
-    shutter_edits.as_layer(effect, effect.active_region, "STILL", "ANGLE_360", bar_edits.auto_key(context))
-
-
-@operator("Trail", needs.a_region)
-def clean_trail(_self: Operator, context: Context, effect: PropertyGroup) -> None:
-    """Make the active region leave a trail in front of everything else, which stays sharp"""
-    shutter_edits.as_layer(effect, effect.active_region, "ANGLE_360", "STILL", bar_edits.auto_key(context))

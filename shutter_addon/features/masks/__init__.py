@@ -1,0 +1,1 @@
+"""Mattes and outlines of Blender's masks."""

@@ -1,0 +1,1 @@
+"""Read Blender's masks, and operators that use them."""

@@ -1,0 +1,1 @@
+"""Mattes of outlines and subjects, carried through the footage."""

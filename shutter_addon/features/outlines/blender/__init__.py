@@ -1,0 +1,1 @@
+"""Outlines and subjects in Blender: previews, drawings, operators and the gizmo."""

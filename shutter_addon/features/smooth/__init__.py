@@ -1,0 +1,1 @@
+"""Smooth exposures: the moments between filmed frames."""

@@ -1,0 +1,1 @@
+"""Smooth exposures in Blender: previews, and notes on too few frames."""

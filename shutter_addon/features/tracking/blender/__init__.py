@@ -1,0 +1,1 @@
+"""Tracking in Blender: keyframes, operators, panels and the command."""
