@@ -53,7 +53,7 @@ GROUPS = {
             "shutter_addon/features/tracking/registration.py",
             "shutter_addon/features/tracking/blender/track_region.py",
             "shutter_addon/blender/editing/motion_keys.py",
-            "shutter_addon/blender/data/targets.py",
+            "shutter_addon/blender/data/selection.py",
             "shutter_addon/features/tracking/blender/track_operators.py",
             "shutter_addon/blender/interface/region_gizmo.py",
         ],

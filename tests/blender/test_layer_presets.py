@@ -7,7 +7,7 @@ from test_region_tracking import SIZE, active, centre, drawn, new_source, pictur
 
 from shutter_addon.blender.editing import region_edits
 from shutter_addon.blender.rendering import sessions
-from shutter_addon.features.tracking.blender import tracked_shots
+from shutter_addon.features.tracking.blender import track_region
 
 COUNT = 24
 
@@ -43,7 +43,7 @@ def test_one_click_and_one_undo(bpy, region, name, own, rest):
 def test_a_region_of_the_default_shutter_gets_one_of_its_own(bpy, region):
     effect = active(bpy)[1]
     region_edits.assign_region(effect, 0, effect.shutters[0])
-    tracked_shots.follow(effect, 0, "REGION", False)
+    track_region.make_follow(effect, 0, "REGION", False)
     effect.shutters[0].follow_region = effect.regions[0].name
     call(bpy, "sharp_subject")
     assert effect.shutters[0].follow == "NOTHING", "what followed follows no more"

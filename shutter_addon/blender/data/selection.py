@@ -1,10 +1,13 @@
 """What is seen and what is active: scene, strip, effect, shutter and region."""
 
+from dataclasses import dataclass
 from typing import Any
 
+import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import Context, PropertyGroup, Scene, Strip
 
+from ...core import revision
 from . import strips
 from .strips import SOURCES, effect_of, effect_strips
 
@@ -149,3 +152,42 @@ def active_region(effect: PropertyGroup) -> Any:
     region = effect.regions[effect.active_region] if 0 <= effect.active_region < len(effect.regions) else None
     shutter = active_shutter(effect)
     return region if region and shutter and region.shutter == shutter.name else None
+
+
+_replaced = revision.Revision()  # of Blender's data, by undo or another file
+
+
+def data_replaced() -> None:
+    """End what works on targets, because its data is gone."""
+    _replaced.changed()
+
+
+@dataclass(frozen=True)
+class Target:
+    """What is worked on. It is looked up before each step, because Blender's data may have changed.
+
+    Attributes:
+        scene: session_uid of the effect scene.
+        index: see selection.moving.
+        known: differs if another region has taken its place.
+    """
+
+    scene: int
+    index: Any
+    known: tuple
+
+    @classmethod
+    def of(cls, effect: PropertyGroup, index: int | None) -> "Target":
+        return cls(effect.scene.session_uid, index, cls._known(effect, index))
+
+    def effect(self) -> PropertyGroup | None:
+        """Return the effect; None: it is gone, moved, or undone, or another region has this index."""
+        effects = (effect for scene in bpy.data.scenes for effect in scene.virtual_shutter.effects if effect.scene)
+        effect = next((effect for effect in effects if effect.scene.session_uid == self.scene), None)
+        is_there = effect is not None and (self.index is None or self.index < len(effect.regions))
+        return effect if is_there and self._known(effect, self.index) == self.known else None
+
+    @staticmethod
+    def _known(effect: PropertyGroup, index: int | None) -> tuple:
+        layer = None if index is None else effect.regions[index].layer
+        return _replaced.number, effect.id_data.session_uid, effect.start, layer

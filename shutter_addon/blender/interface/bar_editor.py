@@ -9,7 +9,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.types import Context, Event, Gizmo, GizmoGroup, PropertyGroup, Scene, Strip
 
 from ...core.messages import EffectError
-from ..data import consistency, selection, targets
+from ..data import consistency, selection
 from ..editing import bar_edits
 from . import drawing
 from .gizmo_groups import TWEAK, Dragged, WithKeys
@@ -122,7 +122,7 @@ class SHUTTER_GT_bars(Dragged, Gizmo):
     def grab(self, context: Context, event: Event, seen: tuple) -> None:
         effect = seen[1]
         self.index = effect.active_shutter
-        self.target = targets.Target.of(effect, None)  # during playback, another effect may become active
+        self.target = selection.Target.of(effect, None)  # during playback, another effect may become active
         self.before = consistency.bars(effect.shutters[self.index])
         # Between keys, the visible bars differ from the stored ones.
         self.values = bar_edits.bars_now(effect, self.index)

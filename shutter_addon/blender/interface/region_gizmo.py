@@ -11,7 +11,7 @@ from bpy.types import Context, Event, Gizmo, GizmoGroup, PropertyGroup, Scene, S
 from ...core import revision
 from ...core.messages import EffectError
 from ...core.model import scribbles
-from ..data import selection, snapshot, targets, validation
+from ..data import selection, snapshot, validation
 from ..editing import bar_edits, drawn_places, motion_keys
 from . import drawing
 from .gizmo_groups import TWEAK, Dragged, View, WithKeys, view
@@ -105,7 +105,7 @@ class SHUTTER_GT_region(Dragged, Gizmo):
         region = selection.active_region(effect)
         drawn_places.hold(effect, effect.active_region)
         # During playback, another effect may become active.
-        self.target = targets.Target.of(effect, effect.active_region)
+        self.target = selection.Target.of(effect, effect.active_region)
         self.before = tuple(region.location), region.rotation, region.scale
         self.grabbed = event.mouse_region_x, event.mouse_region_y
         self.where = seen

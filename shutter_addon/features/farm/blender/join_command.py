@@ -1,12 +1,21 @@
 """The command `join`: a movie of rendered frames, with the edit's sound."""
 
+import re
 from argparse import ArgumentParser, Namespace
+from collections.abc import Callable
+from pathlib import Path
+
+from bpy.types import ImageFormatSettings, Scene
 
 from ....blender.commands import command_line
-from ....blender.data import external_files, versions
+from ....blender.data import external_files, sole_effect, strips, versions
 from ....blender.output import film_output
+from ....blender.output.film_output import OutputError
+from ....core import threads
 from ....core.farm import job_file
-from . import film_join
+from ....core.frames import frame_ranges
+from ....media import rendered_pictures
+from ....media.rendered_pictures import RenderedPicture
 
 HELP = "make a movie of rendered frames, with the edit's sound and settings"
 
@@ -26,4 +35,157 @@ def run(arguments: Namespace) -> None:
         raise film_output.OutputError(fault)  # Blender would make a silent film
     version = versions.of_edit(scene)
     job_file.guard(arguments.folder, version)
-    film_join.join(scene, arguments.folder, arguments.output, frames, version.key)
+    join(scene, arguments.folder, arguments.output, frames, version.key)
+
+
+AT_ONCE = 1000  # pictures per strip: Blender copies all of them for each that is added
+
+
+def join(scene: Scene, folder: Path, output: Path, frames: range, key: str) -> None:
+    """Join rendered frames in a folder to a movie, whole or not at all. This changes `scene`: do not use it again.
+
+    Args:
+        key: Of the edit's version.
+
+    Raises:
+        OutputError, MediaError: Frames are missing, damaged, different or of another edit, or the movie cannot be
+            written.
+        InterruptedRenderError: Stopped by Ctrl-C or TERM.
+        OSError: A folder cannot be read or made.
+    """
+    scene.frame_start, scene.frame_end = frames[0], frames[-1]
+    paths = _pictures(folder, frames[:: scene.frame_step])
+    size = film_output.size(scene)
+    film_output.check(output, None, size)
+    with film_output.progress(len(paths), "picture") as looked:
+        first = _common(paths, looked, size, key)
+    _refuse_transparency(scene, paths, first)
+    _cover_edit(scene, paths, first)
+    _set_output(scene, output, size)
+    film_output.make_folder(output.parent)
+    with film_output.progress(len(paths), "frame") as moved:
+        film_output.render_frames(scene, output, moved)
+
+
+def _pictures(folder: Path, frames: range) -> list[Path]:
+    """Return the picture of each frame, a file whose name is its number.
+
+    Raises:
+        OutputError: Some are missing, or twice.
+        OSError: The folder cannot be read.
+    """
+    pictures: dict[int, Path] = {}
+    for path in sorted(path for path in folder.iterdir() if path.suffix[1:] in film_output.FORMATS):
+        if re.fullmatch(r"\d{1,9}", path.stem):
+            other = pictures.setdefault(int(path.stem), path)
+            if other != path:
+                raise OutputError(f"{folder}: {other.name} and {path.name} are the same frame")
+    if missing := [frame for frame in frames if frame not in pictures]:
+        raise OutputError(f"{folder}: lacks {frame_ranges.in_words(missing)}")
+    return [pictures[frame] for frame in frames]
+
+
+def _common(paths: list[Path], looked: Callable, size: tuple[int, int], key: str) -> RenderedPicture:
+    """Return the common properties of all pictures; `looked` is called after each.
+
+    Raises:
+        OutputError: A picture is damaged, unlike the first, or of another edit than that of `key`.
+    """
+    pool = threads.pool()
+    first: RenderedPicture | None = None
+    try:
+        for path, picture in zip(paths, pool.map(rendered_pictures.read, paths), strict=True):
+            if picture is None:
+                raise OutputError(f"{path}: is damaged or cut off")
+            first = first or picture
+            if picture != first or path.suffix != paths[0].suffix:
+                raise OutputError(f"{path}: {_described(picture)}, unlike {paths[0].name}: {_described(first)}")
+            looked()
+    finally:
+        pool.shutdown(cancel_futures=True)
+    assert first is not None  # an edit has at least one frame
+    if first.size != size or first.edit not in (None, key):
+        wanted = "{}×{}, version {}".format(*size, key)
+        raise OutputError(f"{paths[0]}: {_described(first)}, unlike the edit: {wanted}")
+    return first
+
+
+def _described(picture: RenderedPicture) -> str:
+    words = "{}×{}, {} channels of {}".format(*picture.size, picture.channels, picture.samples)
+    return f"{words}, version {picture.edit or 'unknown'}"
+
+
+def _refuse_transparency(scene: Scene, paths: list[Path], first: RenderedPicture) -> None:
+    """Raise OutputError for transparent PNG files that Blender's own film would show in other colours.
+
+    A film applies the view after composing over black, but the files have it applied to their colours.
+    """
+    is_shown_otherwise = _shown(scene).view_settings.view_transform != "Standard"
+    if paths[0].suffix == ".png" and first.channels in (2, 4) and is_shown_otherwise:
+        for path in paths:
+            if rendered_pictures.is_transparent(path):
+                words = "is transparent, which a film shows otherwise under this view"
+                raise OutputError(f"{path}: {words}; render EXR, or without transparency")
+
+
+def _shown(scene: Scene) -> Scene | ImageFormatSettings:
+    """Return the owner of the display and view settings of the edit's output."""
+    settings = scene.render.image_settings
+    return settings if settings.color_management == "OVERRIDE" else scene
+
+
+def _cover_edit(scene: Scene, paths: list[Path], first: RenderedPicture) -> None:
+    """Cover everything that the edit shows with the pictures. Sounds stay."""
+    editor = scene.sequence_editor
+    editor.display_stack(None)  # Blender renders the meta strip that was open when the file was saved
+    channel = max((strip.channel for strip in editor.strips), default=0) + 1
+    if channel > strips.CHANNELS:
+        raise OutputError("the edit has strips in the uppermost channel, where the frames are to lie; move them down")
+    editor.channels[channel].mute = False
+    space = _keep_colours(scene, paths[0].suffix, first)
+    shown = [path for path in paths for _ in range(scene.frame_step)][: scene.frame_end + 1 - scene.frame_start]
+    for start in range(0, len(shown), AT_ONCE):
+        part = shown[start : start + AT_ONCE]
+        strip = editor.strips.new_image(part[0].name, str(part[0]), channel, scene.frame_start + start)
+        for path in part[1:]:
+            strip.elements.append(path.name)
+        strip.blend_type = "REPLACE"
+        strip.use_float = first.samples != "uint8" or first.channels in (2, 4)
+        if space:
+            strip.colorspace_settings.name = space
+
+
+def _keep_colours(scene: Scene, suffix: str, first: RenderedPicture) -> str | None:
+    """Make the view leave PNG files unchanged, which are finished, and return their colour space.
+
+    EXR files are scene-linear: None.
+    """
+    if suffix == ".exr":
+        return None
+    shown = _shown(scene)
+    try:
+        shown.view_settings.view_transform = "Standard"
+    except TypeError:
+        raise OutputError("PNG frames need the view Standard, which this OpenColorIO configuration lacks") from None
+    for name, value in sole_effect.PLAIN_VIEW.items():
+        setattr(shown.view_settings, name, value)
+    if first.samples == "uint8":
+        scene.render.dither_intensity = 0  # they are dithered already
+    return shown.display_settings.display_device
+
+
+def _set_output(scene: Scene, output: Path, size: tuple[int, int]) -> None:
+    """Set the output: the edit's own settings if they are a movie's, else those of the command.
+
+    The container follows the output's suffix. Burnt in metadata, other sizes and other places are turned off.
+    """
+    render = scene.render
+    if render.image_settings.media_type == "VIDEO":
+        render.ffmpeg.format = film_output.MOVIES[output.suffix.lower()][0]
+        render.ffmpeg.use_autosplit = False
+        film_output.set_place(render, output)
+    else:
+        film_output.set_output(scene, output, "png", alpha=False)
+    render.resolution_x, render.resolution_y = size
+    render.resolution_percentage = 100
+    render.use_stamp = render.use_stamp_note = False

@@ -9,7 +9,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import Context, Event, Gizmo, GizmoGroup, Operator, PropertyGroup, Scene, Strip, UILayout
 
-from ....blender.data import selection, strips, targets
+from ....blender.data import selection, strips
 from ....blender.editing import region_edits
 from ....blender.interface import drawing, needs
 from ....blender.interface.gizmo_groups import Dragged, View, WithKeys, view
@@ -37,7 +37,7 @@ class SHUTTER_OT_outline_needed(Beside, OfEffect, Operator):
 
     def begin(self, context: Context, waits: bool) -> set[str] | None:
         scene, effect, strip = selection.active(context)
-        self._target = targets.Target.of(effect, effect.active_region)
+        self._target = selection.Target.of(effect, effect.active_region)
         file, shown = outline_drawings.carried_frames(scene, effect, strip, effect.active_region)
         with closing(file.open()) as mattes:
             frames = sorted({number for number in shown.values() if not mattes.has(number)})
@@ -177,7 +177,7 @@ class SHUTTER_GT_outline(Dragged, Gizmo):
     def grab(self, context: Context, event: Event, seen: tuple[outlines.Curves, View]) -> None:
         curves, seen_as = seen
         scene, effect, strip = selection.in_picture(context)
-        self.target, self.frame = targets.Target.of(effect, effect.active_region), scene.frame_current
+        self.target, self.frame = selection.Target.of(effect, effect.active_region), scene.frame_current
         self.strip, self.curves, self.by, self.reach = strip.name, curves, (0.0, 0.0), _REACH
         self.aspect = seen_as.aspect
         self.grabbed = tuple(seen_as.on_picture(event.mouse_region_x, event.mouse_region_y))

@@ -11,14 +11,18 @@ from typing import NamedTuple
 
 import numpy as np
 from bpy.app.translations import pgettext_data as data_
+from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.types import PropertyGroup, Scene, Strip
+from bpy.props import EnumProperty, FloatProperty
+from bpy.types import Context, Operator, PropertyGroup, Scene, Strip
 
 from ....blender.data import snapshot, source_media, strips, validation
 from ....blender.data.consistency import bars
 from ....blender.data.sampled import Sampling
 from ....blender.editing import bar_edits, region_edits, shutter_edits
+from ....blender.interface.operator_bases import OfEffect, operator
 from ....core.messages import EffectError
+from ....core.model.choices import CONTEXT, READS, SIDES
 from ....core.model.frame_state import Options
 from ....media import opencv
 from ....media.cuts import ShotSource
@@ -143,3 +147,61 @@ def find(scene: Scene, effect: PropertyGroup, strip: Strip, *, columns: bool) ->
         raise EffectError(rpt_("moving lines stay upright: there is no rolling shutter to repair"))
     sides = ("LEFT", "RIGHT") if columns else ("TOP", "BOTTOM")
     return found, sides[found < 0]
+
+
+def _why_no_repair(effect: PropertyGroup) -> str | None:
+    try:
+        has_repair = of(effect) is not None
+    except EffectError as error:
+        return str(error)
+    return None if has_repair else region_edits.why_full(effect, regions=1, shutters=2)
+
+
+class SHUTTER_OT_rolling_shutter(OfEffect, Operator):
+    """Show every row as it was when the middle one was filmed, so that skewed lines become straight"""
+
+    bl_label = "Rolling Shutter Repair"
+    icon = "CAMERA_DATA"
+    choices = "side"
+    needs = (_why_no_repair,)
+
+    side: EnumProperty(
+        name="Read First",
+        description="The side of the picture that the sensor reads first",
+        items=SIDES,
+        translation_context=CONTEXT,
+    )
+    readout: FloatProperty(
+        name="Readout",
+        description="Time from reading the first row to the last, as a percentage of a frame",
+        subtype="PERCENTAGE",
+        default=50.0,
+        min=1.0,
+        max=100.0,
+        options={"SKIP_SAVE"},
+    )
+
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
+        known = of(effect)
+        if known is not None and not self.properties.is_property_set("readout"):
+            self.readout = 100 * known.readout  # choosing a side in the menu keeps the readout
+        repair(self.edit, effect, self.effect_strip, self.readout / 100, self.side)
+
+
+_READS = EnumProperty(
+    name="Reads",
+    description="Whether the sensor reads row by row or column by column",
+    items=READS,
+    translation_context=CONTEXT,
+)
+
+
+@operator("Find Readout", _why_no_repair, icon="VIEWZOOM", reads=_READS)
+def find_readout(self: Operator, _context: Context, effect: PropertyGroup) -> None:
+    """Find the sensor's readout time from lines that lean while they move around the current frame, and repair it"""
+    found, side = find(self.edit, effect, self.effect_strip, columns=self.reads == "COLUMNS")
+    repair(self.edit, effect, self.effect_strip, min(abs(found), 1.0), side)
+    name = next(name for word, name, _ in SIDES if word == side)
+    percent = round(100 * abs(found))
+    sentence = rpt_("Readout of {percent} % of a frame, read first: {side}")
+    self.report({"INFO"}, sentence.format(percent=percent, side=iface_(name, CONTEXT)))

@@ -6,19 +6,22 @@ measures this when the interface calls `advance`; drawing only asks for what is 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, wait
 from contextlib import suppress
 from dataclasses import dataclass, field
 
 import numpy as np
+from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.types import PropertyGroup
+from bpy.types import Context, Operator, PropertyGroup, UILayout
 
 from ....blender.data import preview_areas
 from ....blender.data.snapshot import Snapshot
 from ....blender.data.source_media import SourceSpec
 from ....blender.devices import main_thread
+from ....blender.interface.operator_bases import operator
+from ....blender.interface.panel_parts import sentence
 from ....compute.renderer import Renderer
 from ....compute.request import Request
 from ....core import threads
@@ -188,3 +191,29 @@ def _measure_motion(spec: SourceSpec, pair: int) -> None:
     if opencv.cv2 is not None:
         with suppress(MediaError, OSError), spec.open() as medium:
             _measuring.moved.keep((spec.key, pair), smooth.moved(medium, pair), _KEPT)
+
+
+def _why_smooth(effect: PropertyGroup) -> str | None:
+    return None if effect.inbetween == "1" else rpt_("The exposures are already smooth")
+
+
+@operator("Smooth Streaks", _why_smooth)
+def smooth_streaks(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
+    """Expose as many moments between filmed frames as the footage needs"""
+    effect.inbetween = "AUTO"
+
+
+def draw_smooth(layout: UILayout, effect: PropertyGroup) -> None:
+    """Draw how smooth an effect is."""
+    row = layout.row(align=True)
+    row.prop(effect, "inbetween")
+    if effect.inbetween != "1":
+        row.prop(effect, "skip_repeats", text="", icon="FRAME_NEXT")
+        if repeats(effect):
+            sentence(layout, iface_("The source repeats frames: motion continues across them"), "INFO")
+
+
+def notes(effect: PropertyGroup) -> Iterator[tuple[str, str]]:
+    """Yield notes on an effect, each with the operator that helps."""
+    if (step := last(effect)) is not None:
+        yield too_few_frames(step), "shutter.smooth_streaks"

@@ -8,13 +8,13 @@ from bpy.props import EnumProperty, IntProperty
 from bpy.types import Context, Operator, PropertyGroup
 
 from .... import features
-from ....blender.data import selection, targets, validation
+from ....blender.data import selection, validation
 from ....blender.editing import bar_edits
 from ....blender.interface import needs
 from ....blender.interface.operator_bases import Beside, OfEffect, given, operator, redraw, report, show_status
 from ....blender.rendering.effect_source import FAULTS
 from ....core.model.choices import CONTEXT
-from . import follow_track, track_region, tracked_shots
+from . import follow_track, track_region
 
 # Seconds: work between two redraws, at least and at most; waiting for the tracking thread.
 _TICK, _MOST, _PATIENCE = 0.05, 0.1, 0.02
@@ -58,9 +58,9 @@ class _Tracks(Beside):
         scene, effect, strip = selection.active(context)
         index = None if self.is_camera else effect.active_region
         moving = selection.moving(effect, index)
-        self._target, self._start = targets.Target.of(effect, index), scene.frame_current
+        self._target, self._start = selection.Target.of(effect, index), scene.frame_current
         self._frame, self._done = self._start, set[int]()
-        if self.once and tracked_shots.is_tracked(scene, effect, strip, index):
+        if self.once and track_region.is_tracked(scene, effect, strip, index):
             return self._finish(context)
         self._frames = track_region.frames_to_track(scene, strip, self.direction, moving.track_until)
         options = {"all_keys": moving.track_all_keys, "patience": None if waits else _PATIENCE}
@@ -177,7 +177,7 @@ class SHUTTER_OT_panning_shot(_Tracks, OfEffect, Operator):
     once = True
 
     def ended(self, context: Context) -> None:
-        tracked_shots.panning_shot(self._target.effect(), self._target.index, bar_edits.auto_key(context))
+        track_region.panning_shot(self._target.effect(), self._target.index, bar_edits.auto_key(context))
 
 
 class SHUTTER_OT_tripod(_Tracks, OfEffect, Operator):
@@ -191,7 +191,7 @@ class SHUTTER_OT_tripod(_Tracks, OfEffect, Operator):
     once = True
 
     def ended(self, context: Context) -> None:
-        tracked_shots.tripod(self._target.effect(), bar_edits.auto_key(context))
+        track_region.tripod(self._target.effect(), bar_edits.auto_key(context))
 
 
 _FRAME = given(IntProperty, "Frame", "Timeline frame; without one, the least confident of the next unsure frames")

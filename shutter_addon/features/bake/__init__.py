@@ -1,1 +1,0 @@
-"""Baking: an effect as a film on disk, which a strip of the edit shows."""

@@ -1,1 +1,0 @@
-"""Baking in Blender: the film, its strip, the operators and the command."""

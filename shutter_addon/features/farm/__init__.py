@@ -1,1 +1,0 @@
-"""Films that several machines render."""

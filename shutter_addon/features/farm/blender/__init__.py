@@ -1,1 +1,0 @@
-"""The command that joins frames to a movie."""

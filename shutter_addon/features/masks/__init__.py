@@ -1,1 +1,0 @@
-"""Mattes and outlines of Blender's masks."""

@@ -1,1 +1,0 @@
-"""Read Blender's masks, and operators that use them."""

@@ -1,1 +1,0 @@
-"""Mattes of outlines and subjects, carried through the footage."""

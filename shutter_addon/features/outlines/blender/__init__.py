@@ -1,1 +1,0 @@
-"""Outlines and subjects in Blender: previews, drawings, operators and the gizmo."""

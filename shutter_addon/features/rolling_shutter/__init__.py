@@ -1,1 +1,0 @@
-"""Rolling shutters: find the readout of a sensor."""

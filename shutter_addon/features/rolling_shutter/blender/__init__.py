@@ -1,1 +1,0 @@
-"""Rolling shutters in Blender: repair them with a ramp of moments."""

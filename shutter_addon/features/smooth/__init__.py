@@ -1,1 +1,0 @@
-"""Smooth exposures: the moments between filmed frames."""

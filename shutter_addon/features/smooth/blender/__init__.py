@@ -1,1 +1,0 @@
-"""Smooth exposures in Blender: previews, and notes on too few frames."""

@@ -1,1 +1,0 @@
-"""Track a region or the camera."""

@@ -1,1 +1,0 @@
-"""Tracking in Blender: keyframes, operators, panels and the command."""
