@@ -15,7 +15,7 @@ from bpy.types import Depsgraph, Scene
 from .. import features
 from ..core import recent_errors, revision
 from ..core.messages import sentence
-from .data import data_format, preview_areas, selection, source_media, strips, versions
+from .data import data_format, preview_areas, source_media, strips, versions
 from .devices import main_thread
 from .editing import reconcile as reconciling
 from .editing import shown_annotations, undelete
@@ -31,7 +31,7 @@ def _forget_file(*_) -> None:
     operator_bases.end_all()
     for forget in features.each("forget"):
         forget()
-    selection.data_replaced()
+    revision.edit.replaced += 1
     sessions.forget()
     invalidation.forget()
     source_media.look_again()
@@ -92,7 +92,7 @@ def _update(scene: Scene | None = None, depsgraph: Depsgraph | None = None) -> N
 def _after_undo(*_) -> None:
     revision.changed()
     reconciling.find_lost()
-    selection.data_replaced()
+    revision.edit.replaced += 1
     invalidation.drop_frames()
     sessions.drop_removed()
     sharp_frame.give_back(bpy.context)

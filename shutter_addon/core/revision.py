@@ -18,10 +18,11 @@ class Revision:
 
     Attributes:
         number: While it is equal, only the current frame can have changed.
+        replaced: How often Blender's data was replaced, by undo or another file.
     """
 
     def __init__(self) -> None:
-        self.number = 0
+        self.number = self.replaced = 0
         # Results and errors, by number, subject and key.
         self._kept: RecentValues[tuple, tuple[Any, Exception | None]] = RecentValues()
 

@@ -47,9 +47,6 @@ class _Decoder:
     numbers: Iterator[int] = field(default_factory=itertools.count)
 
 
-_decoder = _Decoder()  # all movies share a process: starting one takes seconds
-
-
 class BlenderMovie(FrameSource):
     """A movie's frames, decoded by a second Blender.
 
@@ -57,6 +54,7 @@ class BlenderMovie(FrameSource):
     frames Blender may show others.
     """
 
+    decoder = _Decoder()  # all movies share a process: starting one takes seconds
     file_kind, transfer, by_blender = "a movie, read by a second Blender", "srgb", True
 
     def __init__(self, path: str | Path, *, deinterlace: bool = False) -> None:
@@ -64,7 +62,7 @@ class BlenderMovie(FrameSource):
         self.files = [self.path]
         check_name(self.path.absolute())
         self.options = {"stream": 0, "deinterlace": bool(deinterlace)}
-        number = next(_decoder.numbers)
+        number = next(BlenderMovie.decoder.numbers)
         self._known = {"number": number, "path": str(self.path.absolute()), "deinterlace": bool(deinterlace)}
         try:
             about, _ = ask(self._known | {"wanted": "about"})
@@ -92,8 +90,8 @@ class BlenderMovie(FrameSource):
         return frame
 
     def close(self) -> None:
-        with _decoder.asking, suppress(MediaError):
-            if _decoder.process is not None:
+        with BlenderMovie.decoder.asking, suppress(MediaError):
+            if BlenderMovie.decoder.process is not None:
                 _answer(self._known | {"wanted": "close"})
 
 
@@ -111,20 +109,23 @@ def lend(command: list[str] | None) -> None:
     Args:
         command: gets ANSWER as its last argument. None: movies cannot be decoded this way.
     """
-    _decoder.command = command
-    if (process := _decoder.process) is not None:
-        with _killed_after(ENDING, process), _decoder.asking:  # which a thread may hold that waits for an answer
+    BlenderMovie.decoder.command = command
+    if (process := BlenderMovie.decoder.process) is not None:
+        with (
+            _killed_after(ENDING, process),
+            BlenderMovie.decoder.asking,
+        ):  # which a thread may hold that waits for an answer
             _end()
 
 
 def is_lent() -> bool:
     """Return whether movies can be decoded this way."""
-    return _decoder.command is not None
+    return BlenderMovie.decoder.command is not None
 
 
 def ask(wanted: dict) -> tuple[dict, np.ndarray | None]:
     """Return the process's answer, and a frame in new memory if there is one; raise MediaError with its message."""
-    with _decoder.asking:
+    with BlenderMovie.decoder.asking:
         for _ in range(2):  # another movie may have ended it
             if (answer := _answer(wanted)) is not None:
                 return answer
@@ -133,7 +134,7 @@ def ask(wanted: dict) -> tuple[dict, np.ndarray | None]:
 
 def _answer(wanted: dict) -> tuple[dict, np.ndarray | None] | None:
     """Return the answer, or None if the process has ended or was killed because it did not answer."""
-    process = _decoder.process or _started()
+    process = BlenderMovie.decoder.process or _started()
     try:
         with _killed_after(ANSWERING, process):
             return _asked(process, json.dumps(wanted).encode() + b"\n")
@@ -189,11 +190,11 @@ def _line(stream: IO[bytes]) -> bytes:
 
 def _started() -> subprocess.Popen[bytes]:
     """Start the process; raise MediaError if that fails."""
-    if _decoder.command is None:
+    if BlenderMovie.decoder.command is None:
         raise MediaError("no Blender decodes it any more")
     try:
-        _decoder.process = subprocess.Popen(
-            [*_decoder.command, ANSWER],
+        BlenderMovie.decoder.process = subprocess.Popen(
+            [*BlenderMovie.decoder.command, ANSWER],
             stdin=subprocess.PIPE,  # ends with this process, which ends the other one
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -207,12 +208,12 @@ def _started() -> subprocess.Popen[bytes]:
         # Some systems cannot do this, and Linux refuses it to users with many large pipes.
         import fcntl
 
-        fcntl.fcntl(_decoder.process.stdout, fcntl.F_SETPIPE_SZ, _PIPE)  # type: ignore[arg-type]
-    return _decoder.process
+        fcntl.fcntl(BlenderMovie.decoder.process.stdout, fcntl.F_SETPIPE_SZ, _PIPE)  # type: ignore[arg-type]
+    return BlenderMovie.decoder.process
 
 
 def _end() -> None:
-    process, _decoder.process = _decoder.process, None
+    process, BlenderMovie.decoder.process = BlenderMovie.decoder.process, None
     if process is not None:
         with _killed_after(ENDING, process), suppress(OSError), process:  # closes its pipes and waits for its end
             pass

@@ -132,7 +132,7 @@ def held_up(session, until):
 def test_who_is_stopped_waits_neither_for_a_device_nor_for_others_to_be_closed(film):
     """Though the session's thread waits, as for a window that does not answer."""
     scene, answer, half = film[2].scene, threading.Event(), effect_source.Detail(2)
-    waits = held_up(sessions.OFFSCREEN, answer)
+    waits = held_up(sessions.SESSIONS.offscreen, answer)
     stops = iter([False])  # and then it is stopped
     with pytest.raises(StoppedError):
         picture_of(scene, 1, stopped=lambda: next(stops, True))
@@ -141,7 +141,7 @@ def test_who_is_stopped_waits_neither_for_a_device_nor_for_others_to_be_closed(f
     context = sessions.of_render()
     first = context.request(*job_snapshots.of(scene, 1), effect_source.FULL)
     answer.clear()
-    waits = held_up(sessions.OFFSCREEN, answer)
+    waits = held_up(sessions.SESSIONS.offscreen, answer)
     second = context.request(*job_snapshots.of(scene, 1), half)
     assert (first.source.detail, second.source.detail) == (effect_source.FULL, half)
     assert waits.is_alive()

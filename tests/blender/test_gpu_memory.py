@@ -58,7 +58,7 @@ def test_a_session_gives_back_what_it_took_and_settles_for_another_limit(bpy, ed
         picture = picture_of(effect.scene, 1)
         budget = render_settings.memory()
         assert (budget.limit, budget.used > 0) == (ROOMY << 20, True)
-        sessions.OFFSCREEN.free()
+        sessions.SESSIONS.offscreen.free()
         assert np.array_equal(picture_of(effect.scene, 1), picture)
     with render_settings.using(gpu_memory=SMALL):
         sessions.close_if_device_changed()

@@ -17,6 +17,7 @@ from support import (
 
 from shutter_addon.blender.data import annotations, strips
 from shutter_addon.blender.rendering import job_snapshots as snapshots
+from shutter_addon.blender.rendering import render_job
 
 LEVELS = 1
 MOST = 20  # pictures of an effect
@@ -249,7 +250,7 @@ def test_a_hard_cut_changes_no_picture(bpy, edit, render, tmp_path):
     snapshots.begin(edit.session_uid)
     try:
         # What a job of the window reads, which is not to be seen.
-        of_parts = [part for half in (strip, right) for part in snapshots.running.taken[half.scene.session_uid]]
+        of_parts = [part for half in (strip, right) for part in render_job.job.film_data.taken[half.scene.session_uid]]
         assert [shown for shown, _ in of_parts] == [range(1, 5), range(5, 10)]
         assert of_parts[0][1].timing != of_parts[1][1].timing
         assert max(of_parts[0][1].frames) < 7 < max(of_parts[1][1].frames)

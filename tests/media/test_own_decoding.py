@@ -29,7 +29,7 @@ linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks a
 @pytest.fixture(autouse=True)
 def _lent():
     """Blender as a library decodes; one process for all tests that lend no other."""
-    if blender_movie._decoder.command != [sys.executable, str(SCRIPT)]:  # nobody else is told which it is
+    if BlenderMovie.decoder.command != [sys.executable, str(SCRIPT)]:
         blender_movie.lend([sys.executable, str(SCRIPT)])
 
 
@@ -41,7 +41,7 @@ def _ended():
 
 def process():
     """The process that decodes."""
-    return blender_movie._decoder.process.pid  # nobody else is told which it is
+    return BlenderMovie.decoder.process.pid
 
 
 def assert_same(path, *, deinterlace=False):
@@ -259,7 +259,7 @@ def test_a_blender_that_does_not_answer_is_killed_and_one_sentence(coloured, mon
     sentence = rf"^bt709\.mp4: cannot be read as a movie \(the Blender that decodes it {reason}\)$"
     with pytest.raises(MediaError, match=sentence):
         BlenderMovie(coloured["bt709.mp4"])
-    assert blender_movie._decoder.process is None  # nobody else is told whether one runs
+    assert BlenderMovie.decoder.process is None
 
 
 def test_nobody_waits_for_an_answer_that_does_not_come(coloured, monkeypatch):
@@ -267,7 +267,7 @@ def test_nobody_waits_for_an_answer_that_does_not_come(coloured, monkeypatch):
     blender_movie.lend(SILENT)
     with ThreadPoolExecutor(1) as threads:
         asked = threads.submit(BlenderMovie, coloured["bt709.mp4"])
-        while blender_movie._decoder.process is None:  # nobody else is told whether one runs
+        while BlenderMovie.decoder.process is None:
             assert not asked.done()
         monkeypatch.setattr(blender_movie, "ENDING", 0.1)
         blender_movie.lend(None)
@@ -314,7 +314,7 @@ from shutter_addon.media import blender_movie
 from shutter_addon.media.blender_movie import BlenderMovie
 blender_movie.lend([sys.executable, sys.argv[1]])
 source = BlenderMovie(sys.argv[2])
-print(blender_movie._decoder.process.pid, flush=True)
+print(BlenderMovie.decoder.process.pid, flush=True)
 sys.stdin.read()
 """
 

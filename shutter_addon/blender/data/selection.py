@@ -154,14 +154,6 @@ def active_region(effect: PropertyGroup) -> Any:
     return region if region and shutter and region.shutter == shutter.name else None
 
 
-_replaced = revision.Revision()  # of Blender's data, by undo or another file
-
-
-def data_replaced() -> None:
-    """End what works on targets, because its data is gone."""
-    _replaced.changed()
-
-
 @dataclass(frozen=True)
 class Target:
     """What is worked on. It is looked up before each step, because Blender's data may have changed.
@@ -190,4 +182,4 @@ class Target:
     @staticmethod
     def _known(effect: PropertyGroup, index: int | None) -> tuple:
         layer = None if index is None else effect.regions[index].layer
-        return _replaced.number, effect.id_data.session_uid, effect.start, layer
+        return revision.edit.replaced, effect.id_data.session_uid, effect.start, layer

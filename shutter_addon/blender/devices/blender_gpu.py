@@ -40,7 +40,6 @@ FORMATS: dict[str, tuple] = {
 _SENT_BYTES = 16 << 20
 # Has as many samplers and images as any pass. Only OpenGL needs it.
 LETTING_GO = read_pass("blender_gpu", "LET_GO")
-_unused: list = []  # objects of the gpu module, to be freed once Blender's GPU is current
 
 
 def has_context() -> bool:
@@ -64,14 +63,14 @@ def require_context() -> None:
 
 def free(*objects: object) -> None:
     """Free textures and shaders that nothing else refers to, now or once Blender's GPU is current."""
-    _unused.extend(objects)
+    BlenderDevice.unused.extend(objects)
     if has_context():
         free_unused()
 
 
 def free_unused() -> None:
     """Free what could not be freed before. Call it where Blender's GPU is current."""
-    _unused.clear()
+    BlenderDevice.unused.clear()
 
 
 class BlenderDevice(Device):
@@ -79,6 +78,8 @@ class BlenderDevice(Device):
 
     Private methods take and return the gpu module's textures. RelayedDevice calls them on the main thread.
     """
+
+    unused: list = []  # objects of the gpu module, to be freed once Blender's GPU is current
 
     def __init__(self, budget: Budget | None = None, ask_others: Callable[[], None] | None = None) -> None:
         self.name = gpu.platform.renderer_get()

@@ -16,8 +16,6 @@ from ..data import selection
 from ..data.annotations import USERS
 from ..rendering import previews
 
-_emptied: set[int] = set()  # addresses of spaces from which an effect's annotation was removed
-
 
 def follow() -> None:
     """Give the visible effect's annotation to open previews that have another effect's."""
@@ -44,7 +42,7 @@ def is_other(space: SpaceSequenceEditor, seen: tuple | None) -> bool:
     """
     wanted = seen[1].scene.annotation if seen else None
     if space.annotation is None:
-        return wanted is not None and space.as_pointer() in _emptied
+        return wanted is not None and space.as_pointer() in previews.looking.emptied
     return space.annotation != wanted and is_own(space.annotation)
 
 
@@ -61,7 +59,7 @@ def give(space: SpaceSequenceEditor, annotation: Annotation | None) -> None:
     if annotation is None:
         space.preview_overlay.show_annotation = True
     space.annotation = annotation
-    (_emptied.discard if annotation else _emptied.add)(space.as_pointer())
+    (previews.looking.emptied.discard if annotation else previews.looking.emptied.add)(space.as_pointer())
 
 
 def let_go(annotation: ID) -> None:
@@ -75,12 +73,12 @@ def before_undo(*_: object) -> None:
     """Note which previews show strokes. Blender removes undone annotations from them without restoring them."""
     for space in _spaces():
         if space.annotation is not None and is_own(space.annotation):
-            _emptied.add(space.as_pointer())
+            previews.looking.emptied.add(space.as_pointer())
 
 
 def forget() -> None:
     """Forget all previews before another file is loaded."""
-    _emptied.clear()
+    previews.looking.emptied.clear()
 
 
 def _spaces() -> Iterator[SpaceSequenceEditor]:

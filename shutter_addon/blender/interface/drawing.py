@@ -170,6 +170,8 @@ def text_width(words: str) -> float:
 class Quad:
     """The area of a strip's picture in a preview's region, with its crop."""
 
+    shaders: dict[str, GPUShader] = {}  # by pass, because compiling takes long
+
     def __init__(self, region: Region, shown: Shown) -> None:
         self.view = view(shown.effect, shown.strip, region)
         strip, render = shown.strip, shown.scene.render
@@ -209,12 +211,9 @@ class Quad:
             gpu.state.scissor_test_set(False)  # Blender's state in draw handlers
 
 
-_shaders: dict[str, GPUShader] = {}  # by pass, because compiling takes long
-
-
 def shader_of(name: str) -> GPUShader:
     """Return the shader of a pass of shaders/show.glsl, compiled once."""
-    if name not in _shaders:
+    if name not in Quad.shaders:
         quad, shown = read_pass("show", "QUAD"), read_pass("show", name)
         between = gpu.types.GPUStageInterfaceInfo("show_interface")
         info = gpu.types.GPUShaderCreateInfo()
@@ -231,11 +230,11 @@ def shader_of(name: str) -> GPUShader:
             info.fragment_out(slot, kind.upper(), given)
         info.vertex_source(quad.body)
         info.fragment_source(shown.body)
-        _shaders[name] = gpu.shader.create_from_info(info)
-    return _shaders[name]
+        Quad.shaders[name] = gpu.shader.create_from_info(info)
+    return Quad.shaders[name]
 
 
 def free() -> None:
     """Free the shaders."""
-    blender_gpu.free(*_shaders.values())
-    _shaders.clear()
+    blender_gpu.free(*Quad.shaders.values())
+    Quad.shaders.clear()

@@ -172,11 +172,12 @@ class Beside(Named):
 
     tick = 0.1
     blocks = False
+    timers: list = []  # of all running operators
 
     def leave(self, context: Context) -> None:
         """Remove the timer and the text in the status bar."""
-        if self._timer in _timers:
-            _timers.remove(self._timer)
+        if self._timer in self.timers:
+            self.timers.remove(self._timer)
             context.window_manager.event_timer_remove(self._timer)
             show_status(None)
 
@@ -188,13 +189,13 @@ class Beside(Named):
 
     def go_on(self, context: Context) -> set[str]:
         self._timer = context.window_manager.event_timer_add(self.tick, window=context.window)
-        _timers.append(self._timer)
+        self.timers.append(self._timer)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
     def modal(self, context: Context, event: Event) -> set[str]:
         is_stopped = event.type == "ESC" and event.value == "PRESS"
-        is_over = is_stopped or self._timer not in _timers
+        is_over = is_stopped or self._timer not in self.timers
         try:
             is_over = is_over or (event.type == "TIMER" and not self.goes_on(context))
         except Exception:  # Blender then ends the operator without calling `cancel`
@@ -210,9 +211,6 @@ class Beside(Named):
         self.leave(context)
 
 
-_timers: list = []  # of running operators
-
-
 def show_status(words: str | None) -> None:
     """Show a text in the status bar of all workspaces; None: Blender's own."""
     for workspace in bpy.data.workspaces:
@@ -221,8 +219,8 @@ def show_status(words: str | None) -> None:
 
 def end_all() -> None:
     """End all running operators before another file is loaded."""
-    while _timers:  # Blender crashes if the status text changes while it quits
-        bpy.context.window_manager.event_timer_remove(_timers.pop())
+    while Beside.timers:  # Blender crashes if the status text changes while it quits
+        bpy.context.window_manager.event_timer_remove(Beside.timers.pop())
         show_status(None)
 
 

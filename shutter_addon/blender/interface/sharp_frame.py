@@ -5,42 +5,22 @@ the stroke. The display channel is saved in files, so it is reset before saving.
 a subject is looked for under it.
 """
 
-from dataclasses import dataclass
-
 import bpy
 from bpy.types import Context, SpaceSequenceEditor
 
 from ... import features
 from ..data import consistency, preview_areas, selection, strips
 from ..devices import main_thread
-from ..rendering.previews import pen_is_down
+from ..rendering.previews import looking, pen_is_down
 
 _TOOLS = "builtin.annotate"  # prefix of the tools' names
-
-
-@dataclass
-class _Pen:
-    """What the pen has changed in the previews.
-
-    Attributes:
-        channel: display channel that the previews show; 0: the result.
-        tool: tool that *Draw* or *Erase* replaced, to restore after the stroke; "": none.
-        is_down: whether the pen was down when a preview was last drawn.
-    """
-
-    channel: int = 0
-    tool: str = ""
-    is_down: bool = False
-
-
-_pen = _Pen()  # module state, because Blender does not report strokes
 
 
 def take_up(context: Context, tool: str) -> bool:
     """Activate a drawing tool in the previews until a stroke is finished. Return whether there is a preview."""
     before = context.workspace.tools.from_space_sequencer("PREVIEW", create=False)
     if before is None or not before.idname.startswith(_TOOLS):
-        _pen.tool = before.idname if before else "builtin.select_box"
+        looking.pen.tool = before.idname if before else "builtin.select_box"
     return _choose(context, tool)
 
 
@@ -61,59 +41,59 @@ def show(context: Context) -> None:
     if source is None or source.mute or source.parent_meta() != active[2].parent_meta():
         return
     give_back(context)
-    _pen.channel = source.channel
+    looking.pen.channel = source.channel
     for _window, area in preview_areas.previews(context):
         space = area.spaces.active
         if not space.display_channel and space.annotation == active[1].scene.annotation:
-            space.display_channel = _pen.channel
+            space.display_channel = looking.pen.channel
 
 
 def give_back(context: Context) -> None:
     """Show the result in the previews again."""
-    for _window, area in preview_areas.previews(context) if _pen.channel else ():
-        if area.spaces.active.display_channel == _pen.channel:
+    for _window, area in preview_areas.previews(context) if looking.pen.channel else ():
+        if area.spaces.active.display_channel == looking.pen.channel:
             area.spaces.active.display_channel = 0
-    _pen.channel = 0
+    looking.pen.channel = 0
 
 
 def forget() -> None:
     """Forget the pen before another file is loaded."""
     give_back(bpy.context)
-    _pen.tool = ""
+    looking.pen.tool = ""
 
 
 def follow_pen() -> None:
     """Notice the pen while a preview is drawn. Changes follow later, as drawing code must not change data."""
-    was_down, _pen.is_down = _pen.is_down, pen_is_down()
-    if _pen.is_down and not _pen.channel:
+    was_down, looking.pen.is_down = looking.pen.is_down, pen_is_down()
+    if looking.pen.is_down and not looking.pen.channel:
         main_thread.later(_show)
-    elif was_down and not _pen.is_down:
+    elif was_down and not looking.pen.is_down:
         main_thread.later(_lay_down)
 
 
 def is_shown(space: SpaceSequenceEditor) -> bool:
     """Return whether a preview shows the source frame for the pen."""
-    return bool(_pen.channel) and space.display_channel == _pen.channel
+    return bool(looking.pen.channel) and space.display_channel == looking.pen.channel
 
 
 def _tool_chosen() -> None:
     """Show the result when the user activates another tool, which redraws no preview."""
     tool = bpy.context.workspace.tools.from_space_sequencer("PREVIEW", create=False)
     if tool is not None and not tool.idname.startswith(_TOOLS):
-        _pen.tool = ""
+        looking.pen.tool = ""
         give_back(bpy.context)
 
 
 def _show() -> None:
-    if _pen.is_down:
+    if looking.pen.is_down:
         show(bpy.context)
 
 
 def _lay_down() -> None:
-    if not _pen.is_down:
+    if not looking.pen.is_down:
         give_back(bpy.context)
-        if _pen.tool:
-            _choose(bpy.context, _pen.tool)
+        if looking.pen.tool:
+            _choose(bpy.context, looking.pen.tool)
         if (seen := selection.in_picture(bpy.context)) and selection.active_region(seen[1]):
             consistency.aim_pen(seen[1])
             for after_stroke in features.each("after_stroke"):

@@ -55,19 +55,19 @@ def begin(scene: Scene) -> None:
     """Begin the render of an edit, on the main thread."""
     end()
     if render_job.where() is Where.BACKGROUND and scene.sequence_editor is not None:
-        job_snapshots.running.feed = _Film(scene.session_uid)
+        render_job.job.film_data.feed = _Film(scene.session_uid)
 
 
 def end() -> None:
     """Restore the edit."""
-    film, job_snapshots.running.feed = job_snapshots.running.feed, None
+    film, render_job.job.film_data.feed = render_job.job.film_data.feed, None
     if film is not None:
         film.changed.close()
 
 
 def before_frame(scene: Scene) -> None:
     """Prepare the edit for its current frame."""
-    film = job_snapshots.running.feed
+    film = render_job.job.film_data.feed
     if film is None or film.scene != scene.session_uid:
         return
     if not film.has_begun:  # a single picture can be saved as floats later

@@ -49,7 +49,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
             invalidation.mark_reduced(scene.session_uid)
         if is_drawn:
             return  # without a result, which is fastest for Blender
-        last = job_snapshots.running.pictures.get(scene.session_uid) if render_job.where() is Where.JOB else None
+        last = render_job.job.film_data.pictures.get(scene.session_uid) if render_job.where() is Where.JOB else None
         if last is not None and last.shape == (height, width, 4):
             self._show(last)  # so that the render's window is not empty meanwhile
         context = sessions.of_engine(self._say)
@@ -66,7 +66,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
         self._show(picture)
         self.update_progress(1.0)
         if render_job.where() is Where.JOB:
-            job_snapshots.running.pictures[scene.session_uid] = picture
+            render_job.job.film_data.pictures[scene.session_uid] = picture
         context.session.begin_next(shown, frame, context)
 
     def _show(self, picture: np.ndarray) -> None:

@@ -11,11 +11,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
-from typing import Any
 
 import bpy
-import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import PropertyGroup, Scene, Strip
 
@@ -24,29 +21,7 @@ from ...core.stopping import StoppedError
 from ..data import requirements, snapshot, strips
 from ..data.snapshot import Snapshot
 from . import effect_source, invalidation, render_job, sessions
-from .render_job import Where
-
-
-@dataclass
-class _Film:
-    """What is known of the running job or film, by session_uid of effect scenes.
-
-    Attributes:
-        taken: Of a job: timeline frames and snapshot of each part of a cut strip, or why there is none.
-        read: Of a film in the background, by effect scene and strip; None: it was read once, for one frame.
-        pictures: Of a job: the last ones, shown until the next are made.
-        left_out: Of a job: see requirements.left_out.
-        feed: Of a film in the background: its file of levels (output.edit_feed), or None.
-    """
-
-    taken: dict[int, list[tuple[range, Snapshot]] | Exception] = field(default_factory=dict)
-    read: dict[tuple[int, str], Snapshot | None] = field(default_factory=dict)
-    pictures: dict[int, np.ndarray] = field(default_factory=dict)
-    left_out: list[tuple[range, str]] = field(default_factory=list)
-    feed: Any = None
-
-
-running = _Film()
+from .render_job import Where, job
 
 
 def begin(film: int) -> None:
@@ -55,14 +30,14 @@ def begin(film: int) -> None:
     film_scene = strips.scene_of_uid(film)
     for scene, effect, parts in shown_effects(film_scene) if film_scene else ():
         uid, is_film = effect.scene.session_uid, scene == film_scene
-        if uid in running.taken:  # a copied scene: the first counts, as in strips.find_effect
+        if uid in job.film_data.taken:  # a copied scene: the first counts, as in strips.find_effect
             continue
         try:
             taken = [snapshot.take(scene, effect, part, asked_frames(scene, [part], is_film)) for part in parts]
             shown = [range(part.left_handle, part.right_handle) for part in parts]
-            running.taken[uid] = list(zip(shown, taken, strict=True))
+            job.film_data.taken[uid] = list(zip(shown, taken, strict=True))
         except effect_source.FAULTS as error:
-            running.taken[uid] = error
+            job.film_data.taken[uid] = error
     look(film)
 
 
@@ -74,7 +49,7 @@ def _part_at(parts: list[tuple[range, Snapshot]], scene_frame: float) -> Snapsho
 
 def end() -> None:
     """Forget all snapshots, after a job or a film."""
-    for known in (running.taken, running.read, running.pictures, running.left_out):
+    for known in (job.film_data.taken, job.film_data.read, job.film_data.pictures, job.film_data.left_out):
         known.clear()
     sessions.end_job()
 
@@ -82,12 +57,12 @@ def end() -> None:
 def look(film: int) -> None:
     """Find the frames at which the sequencer leaves effects out: the user may delete a camera during the render."""
     scene = strips.scene_of_uid(film)
-    running.left_out = requirements.left_out(scene) if scene else []
+    job.film_data.left_out = requirements.left_out(scene) if scene else []
 
 
 def left_out(scene: Scene) -> str | None:
     """Return why the sequencer leaves an effect out of a film's current frame, or None."""
-    reasons = running.left_out if render_job.where() is Where.JOB else requirements.left_out(scene)
+    reasons = job.film_data.left_out if render_job.where() is Where.JOB else requirements.left_out(scene)
     return next((why for frames, why in reasons if scene.frame_current in frames), None)
 
 
@@ -102,7 +77,7 @@ def of(effect_scene: Scene, scene_frame: float, ended: Callable[[], bool] | None
     """
     uid = effect_scene.session_uid
     if render_job.where() is Where.JOB:
-        parts = running.taken.get(uid)
+        parts = job.film_data.taken.get(uid)
         taken = _part_at(parts, scene_frame) if isinstance(parts, list) else parts
         if taken is None or (isinstance(taken, Snapshot) and taken.timeline_frame(scene_frame) not in taken.frames):
             taken = render_job.on_main_thread(lambda: _late(uid, scene_frame), ended)
@@ -121,15 +96,15 @@ def of(effect_scene: Scene, scene_frame: float, ended: Callable[[], bool] | None
 def _of_film(scene: Scene, effect: PropertyGroup, strip: Strip, frame: float) -> Snapshot:
     """Return the snapshot of an effect in the background."""
     key, frames = (effect.scene.session_uid, strip.name), {frame, frame + scene.frame_step}
-    is_again = key in running.read and not render_job.scripts_act()
-    if is_again and (known := running.read[key]) is not None and frame in known.frames:
+    is_again = key in job.film_data.read and not render_job.scripts_act()
+    if is_again and (known := job.film_data.read[key]) is not None and frame in known.frames:
         return known
     if is_again:
         parts = [part for part in strips.effect_strips(scene) if part.scene == effect.scene]
         frames |= asked_frames(scene, parts, scene.session_uid == render_job.job.film)
     taken = snapshot.take(scene, effect, strip, frames)
     if render_job.runs():
-        running.read[key] = taken if is_again else None
+        job.film_data.read[key] = taken if is_again else None
     return taken
 
 

@@ -91,6 +91,21 @@ class Drawing:
 
 
 @dataclass
+class _Pen:
+    """What the pen has changed in the previews.
+
+    Attributes:
+        channel: display channel that the previews show; 0: the result.
+        tool: tool that *Draw* or *Erase* replaced, to restore after the stroke; "": none.
+        is_down: whether the pen was down when a preview was last drawn.
+    """
+
+    channel: int = 0
+    tool: str = ""
+    is_down: bool = False
+
+
+@dataclass
 class _Looking:
     """How previews are looked at.
 
@@ -98,12 +113,16 @@ class _Looking:
         late_until: Time until which pictures may be late.
         decision: The engine's, for the draw handler that Blender calls next.
         slices: Slices of time in which a request is composed.
+        pen: Blender does not report strokes.
+        emptied: Addresses of spaces from which an effect's annotation was removed.
     """
 
     whole: Whole | None = None
     late_until: float = 0.0
     decision: Decision | None = None
     slices: Slices = field(default_factory=Slices)
+    pen: _Pen = field(default_factory=_Pen)
+    emptied: set[int] = field(default_factory=set)
 
 
 looking = _Looking()
@@ -296,7 +315,7 @@ def refine() -> None:
 
 def show_carried() -> None:
     """Redraw previews with new mattes of outlines."""
-    sessions.WINDOW.keep(set())
+    sessions.SESSIONS.window.keep(set())
     invalidation.drop_frames()
     preview_areas.redraw()
 

@@ -17,15 +17,19 @@ from dataclasses import dataclass, field
 from enum import Enum
 from functools import partial
 from itertools import chain
+from pathlib import Path
 from types import FrameType
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import bpy
+import numpy as np
 from bpy.types import Scene
 
 from ...core import threads
 from ...core.messages import sentence, signed
+from ...devices.device import Budget
 from ..data.property_copy import for_a_while
+from ..data.snapshot import Snapshot
 from ..data.strips import ENGINE
 from ..devices import main_thread
 
@@ -56,6 +60,42 @@ class Where(Enum):
 
 
 @dataclass
+class _RenderSettings:
+    """What a command sets for its render.
+
+    Attributes:
+        device: One of available.CHOICES.
+        weights: Folder for the coefficients of every picture, as EXR files.
+        gpu_memory: Megabytes of the GPU that textures may take; 0: as device.allowed.
+        budget: With the megabytes that it was made for.
+    """
+
+    device: str | None = None
+    weights: Path | None = None
+    gpu_memory: int | None = None
+    budget: tuple[int, Budget] | None = None
+
+
+@dataclass
+class _FilmData:
+    """What is known of the running job or film, by session_uid of effect scenes.
+
+    Attributes:
+        taken: Of a job: timeline frames and snapshot of each part of a cut strip, or why there is none.
+        read: Of a film in the background, by effect scene and strip; None: it was read once, for one frame.
+        pictures: Of a job: the last ones, shown until the next are made.
+        left_out: Of a job: see requirements.left_out.
+        feed: Of a film in the background: its file of levels (output.edit_feed), or None.
+    """
+
+    taken: dict[int, list[tuple[range, Snapshot]] | Exception] = field(default_factory=dict)
+    read: dict[tuple[int, str], Snapshot | None] = field(default_factory=dict)
+    pictures: dict[int, np.ndarray] = field(default_factory=dict)
+    left_out: list[tuple[range, str]] = field(default_factory=list)
+    feed: Any = None
+
+
+@dataclass
 class _Job:
     """The render that runs, or ran last.
 
@@ -69,6 +109,8 @@ class _Job:
         waited_for: Whether the window waits for every picture (Where.WAITED_FOR).
         spent: Names of scenes and cameras of small renders (_cancel).
         said: Sentences that were said once (say_once).
+        settings: Of the running command; empty in the window.
+        film_data: What is known of the running job or film.
     """
 
     film: int | None = None
@@ -80,6 +122,8 @@ class _Job:
     waited_for: bool = False
     spent: list[tuple[str, str]] = field(default_factory=list)
     said: set[str] = field(default_factory=set)
+    settings: _RenderSettings = field(default_factory=_RenderSettings)
+    film_data: _FilmData = field(default_factory=_FilmData)
 
 
 job = _Job()

@@ -6,6 +6,7 @@ The engine, the draw handler, commands and the feed of a film get a RenderContex
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import bpy
 
@@ -20,16 +21,30 @@ from .session import RenderContext, RenderSession
 _ANSWER = 5.0  # seconds that a job waits for the window to free memory
 
 
+class _Sessions(NamedTuple):
+    """The sessions.
+
+    Attributes:
+        offscreen: Of renders.
+        window: Of previews.
+        waited_for: Of a thread that the window waits for, where `offscreen` would need the window's GPU.
+    """
+
+    offscreen: RenderSession
+    window: RenderSession
+    waited_for: RenderSession
+
+
 def _ask_window() -> None:
     """Free the window's memory for a job. The window is not drawn meanwhile, and loads it again."""
     if render_job.where() is Where.JOB:
-        main_thread.ask(WINDOW.free, _ANSWER)
+        main_thread.ask(SESSIONS.window.free, _ANSWER)
 
 
 def _ask_offscreen() -> None:
     """Free what renders keep for the next one, unless one runs."""
     if not render_job.runs():
-        OFFSCREEN.free()
+        SESSIONS.offscreen.free()
 
 
 def _want_matte(file: MatteFile, frame: int) -> None:
@@ -40,31 +55,31 @@ def _want_matte(file: MatteFile, frame: int) -> None:
 # The window's pictures are made on its main thread and GPU. Renders have another device with a thread, because another
 # GL context cannot always be current beside Blender's (see GLDevice). In the background, Blender's GPU belongs to the
 # main thread.
-OFFSCREEN = RenderSession(lambda: available.choose(render_settings.wanted()), _ask_window)
-WINDOW = RenderSession(lambda: ("blender", None), _ask_offscreen, _want_matte)
-# For a thread that the window waits for, where OFFSCREEN would need the window's GPU.
-WAITED_FOR = RenderSession(lambda: available.choose(render_settings.wanted(), window_waits=True), lambda: None)
-SESSIONS = OFFSCREEN, WINDOW, WAITED_FOR
+SESSIONS = _Sessions(
+    offscreen=RenderSession(lambda: available.choose(render_settings.wanted()), _ask_window),
+    window=RenderSession(lambda: ("blender", None), _ask_offscreen, _want_matte),
+    waited_for=RenderSession(lambda: available.choose(render_settings.wanted(), window_waits=True), lambda: None),
+)
 
 
 def of_drawing() -> RenderContext:
     """Return the context of what is drawn on the main thread; without a window, a script draws."""
-    return RenderContext(WINDOW) if render_job.where() is Where.WINDOW else of_render()
+    return RenderContext(SESSIONS.window) if render_job.where() is Where.WINDOW else of_render()
 
 
 def of_engine(say: Callable[[str], None]) -> RenderContext:
     """Return the context of the engine: a preview where Blender draws, else a render."""
-    return of_render(say) if render_job.ends_films() else RenderContext(WINDOW, say)
+    return of_render(say) if render_job.ends_films() else RenderContext(SESSIONS.window, say)
 
 
 def of_render(
     say: Callable[[str], None] = print, *, levels: bool = False, display: Display | None = None
 ) -> RenderContext:
     """Return the context of a render, on a device that needs no window. NoDeviceError: there is none."""
-    session = OFFSCREEN
+    session = SESSIONS.offscreen
     if render_job.where() is Where.WAITED_FOR:
-        WAITED_FOR.close_if_device_changed()  # no handler runs when such a film begins
-        session = WAITED_FOR if OFFSCREEN.device == "relayed" else OFFSCREEN
+        SESSIONS.waited_for.close_if_device_changed()  # no handler runs when such a film begins
+        session = SESSIONS.waited_for if SESSIONS.offscreen.device == "relayed" else SESSIONS.offscreen
     return RenderContext(session, say, levels=levels, display=display)
 
 
@@ -72,15 +87,15 @@ def close_if_device_changed() -> None:
     """Use the device and memory that the user wants now, before a render, on the main thread."""
     if render_settings.forget_memory_if_changed():
         forget()
-    WAITED_FOR.forget()  # its frames take main memory
-    OFFSCREEN.close_if_device_changed()
+    SESSIONS.waited_for.forget()  # its frames take main memory
+    SESSIONS.offscreen.close_if_device_changed()
 
 
 def end_job() -> None:
     """Drop what a window's job has begun, and snapshots. A script's next still may go on from the last one."""
     if render_job.where() is Where.JOB:
-        OFFSCREEN.rest()
-    OFFSCREEN.requests.clear()
+        SESSIONS.offscreen.rest()
+    SESSIONS.offscreen.requests.clear()
 
 
 def drop_removed() -> None:
