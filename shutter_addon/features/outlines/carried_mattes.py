@@ -1,5 +1,7 @@
-"""The mattes of an outline in all frames of its footage: carried from its drawings when they are asked for, and kept as
-files. What a file is made of is in its name: a drawing that changes leaves those alone that do not depend on it.
+"""The mattes of an outline in all frames of its footage.
+
+A matte is carried from the outline's drawings when somebody asks for it, and kept as a file. The file's name has a hash
+of everything that the matte is made of. So after a drawing changes, files that do not depend on it are still used.
 """
 
 from __future__ import annotations
@@ -31,8 +33,8 @@ from . import carrying
 
 CONFIDENCE = "confidence "  # what a file's description says (carrying.Carried)
 VERSION = 4  # raise it when mattes of the same drawings change
-TRUSTED = 0.2  # confidence below which a drawing is carried no farther
-FADE = 4  # frames in which it fades there
+TRUSTED = 0.2  # confidence below which a lone drawing's mattes fade out
+FADE = 4  # frames that this takes
 BLOCK = 20  # frames beyond a drawing that are carried together
 # Seconds between two looks at what another process carries, after which that counts as killed, and from one sign of its
 # life to the next: somebody waits for what is carried, and to carry it twice does no harm.
@@ -43,12 +45,21 @@ Drawings = tuple[tuple[int, outlines.Curves], ...]  # source frames with the cur
 
 
 class CarriedMattes(SourceWrapper):
-    """The mattes, a core.model.mattes.MatteSource; close it. Its frames are the source's filmed ones."""
+    """Makes, keeps and reads mattes (a core.model.mattes.MatteSource). Its frames are the source's filmed frames.
+
+    Close it after use.
+    """
 
     step = 1
 
     def __init__(self, source: FrameSource, drawings: Drawings, folder: Path | None = None) -> None:
-        """Read mattes that are carried from drawings; see subject_mattes.CarriedFile."""
+        """Use mattes that are carried from drawings; see subject_mattes.CarriedFile.
+
+        Args:
+            source: The footage.
+            drawings: The outline's drawings.
+            folder: Where to keep mattes. None: in a temporary folder.
+        """
         super().__init__(source)
         self._shots = source if isinstance(source, ShotSource) else ShotSource(source)
         self._drawings = {frame: curves for frame, curves in drawings if 0 <= frame < self.count}
@@ -58,8 +69,11 @@ class CarriedMattes(SourceWrapper):
         self._spec = ImageSpec(self.width, self.height, 1, "uint8")
 
     def read(self, index: int) -> np.ndarray:
-        """The values (height, width) float32, 0 to 1, of a frame; those around it are carried with it. MediaError: a
-        frame cannot be read, or the folder cannot be written to."""
+        """Return a frame's matte (height, width) float32, 0 to 1. If it is not kept yet, make it and those around it.
+
+        Raises:
+            MediaError: A frame cannot be read, or the folder cannot be written to.
+        """
         index = min(max(index, 0), self.count - 1)
         near = self._near(index)
         if near == (None, None):
@@ -71,17 +85,17 @@ class CarriedMattes(SourceWrapper):
         return self._nothing() if matte is None else matte / np.float32(255)
 
     def has(self, index: int) -> bool:
-        """Whether a frame's matte is kept already; its file is not opened."""
+        """Return whether a frame's matte is ready: its file exists, or no drawing is near, so that it is empty."""
         near = self._near(index)
         return near == (None, None) or derived.size_of(self._path(index, *near)) is not None
 
     def confidence(self, index: int) -> float | None:
-        """How sure a frame's matte is (carrying.Carried); None: it is not kept yet."""
+        """Return how sure a frame's matte is (carrying.Carried), or None if it is not kept or no drawing is near."""
         near = self._near(index)
         return None if near == (None, None) else self._described(self._path(index, *near))
 
     def _described(self, path: Path) -> float | None:
-        """The confidence that a file's description has; None: it is not kept, or not ours."""
+        """Return the confidence in a file's description, or None if there is no such file of ours."""
         if (image := derived.opened(path, self._spec)) is None:
             return None
         with closing(image):
@@ -92,18 +106,25 @@ class CarriedMattes(SourceWrapper):
             return None
 
     def curves(self, index: int) -> outlines.Curves:
-        """What encloses a frame's matte: drawn there, or around what is carried, and until that is kept, curves that go
-        straight from drawing to drawing. MediaError: the matte cannot be read."""
+        """Return the outline at a frame.
+
+        Returns:
+            The drawing, if there is one at this frame. Otherwise the curves around the matte, or curves that move
+            straight from drawing to drawing while the matte is not kept yet.
+
+        Raises:
+            MediaError: The matte cannot be read.
+        """
         if index in self._drawings:
             return self._drawings[index]
         return traced(self.read(index)) if self.has(index) else outlines.curves(self._straight(index))
 
     def straight(self, index: int) -> np.ndarray:
-        """What stands in for a frame's matte until that is carried, as `read`."""
+        """Return a stand-in for a frame's matte, like `read`: the outline that moves straight between drawings."""
         return outlines.coverage(self._straight(index), self.width, self.height)
 
     def _straight(self, index: int) -> list[np.ndarray]:
-        """Strokes that go straight from drawing to drawing."""
+        """Return the strokes of the outline at a frame, if it moves straight from drawing to drawing."""
         near = nearest(index, self._drawings, carrying.FARTHEST)
         ends = [frame for frame in near if frame is not None]
         if not ends:
@@ -113,7 +134,11 @@ class CarriedMattes(SourceWrapper):
         return scribbles.between_strokes(before, behind, share, self.width / self.height)
 
     def _carried(self, index: int, first: int | None, last: int | None) -> np.ndarray | None:
-        """A frame's matte (H, W) uint8, which is kept then, as are those that are carried with it."""
+        """Make a frame's matte and those that are carried with it, and write their files.
+
+        Returns:
+            The frame's matte, (H, W) uint8.
+        """
         matte = None
         for made in self._made(index, *self._in_shot(index, first, last)):
             write_levels(self._path(made.frame, first, last), made.matte, f"{CONFIDENCE}{made.confidence:.3f}")
@@ -123,7 +148,13 @@ class CarriedMattes(SourceWrapper):
 
     @contextmanager
     def _claimed(self, index: int, first: int | None, last: int | None) -> Iterator[np.ndarray | None]:
-        """While this process alone carries what lies between two drawings; what another has kept of a matte by then."""
+        """Wait while another process carries mattes between the two drawings, and keep others away in the context.
+
+        The wait ends early when the frame's matte is there.
+
+        Returns:
+            A context manager that gives the frame's matte if another process has made it, else None.
+        """
         name, path = derived.key({"drawn": self._drawn(first, last)}), self._path(index, first, last)
         with Claims(path.parent, _PATIENCE, _BEAT) as claims:
             try:
@@ -137,15 +168,15 @@ class CarriedMattes(SourceWrapper):
             yield self._kept(path)
 
     def close(self) -> None:
-        """Closes the footage; a later read opens it again."""
+        """Close the footage. A later read opens it again."""
         self._shots.close()
 
     def _near(self, index: int) -> tuple[int | None, int | None]:
-        """Return the drawings before and behind a frame that are near enough; twice its own."""
+        """Return the nearest frames with drawings before and after a frame; see `nearest`."""
         return nearest(index, self._drawings, carrying.FARTHEST)
 
     def _in_shot(self, index: int, first: int | None, last: int | None) -> tuple[int | None, int | None]:
-        """Those of them that lie in the frame's shot."""
+        """Return `first` and `last`, each None if it lies in another shot than the frame."""
         if first == last:
             return first, last
         shot = self._shots.around(index, *(index if end is None else end for end in (first, last)))
@@ -153,7 +184,7 @@ class CarriedMattes(SourceWrapper):
         return (first if first in shot else None), (last if last in shot else None)
 
     def _made(self, index: int, first: int | None, last: int | None) -> Iterator[carrying.Carried]:
-        """Of all frames between two drawings, or of those beyond one as far as a frame."""
+        """Yield the mattes that are made together with a frame's (`_span`)."""
         if first is None and last is None:  # kept as well: else it would be lacking again and again
             yield carrying.Carried(index, np.zeros((self.height, self.width), np.uint8), confidence=1.0)
             return
@@ -169,7 +200,11 @@ class CarriedMattes(SourceWrapper):
             yield from self._fading(list(carried) if before else list(carried)[::-1])
 
     def _span(self, index: int, first: int | None, last: int | None) -> range:
-        """The frames that are carried together with one: all between two drawings, or some beyond one, in its shot."""
+        """Return the frames whose mattes are made together with a frame's, all in its shot.
+
+        Between two drawings, those are all frames there. Beyond the only drawing, they are one or more blocks of BLOCK
+        frames from the drawing on, up to carrying.FARTHEST frames.
+        """
         if first is not None and last is not None:
             return range(first + 1, last)
         if first is not None:
@@ -180,7 +215,11 @@ class CarriedMattes(SourceWrapper):
         return range(max(start, self._shots.around(index, start, last).start), last)
 
     def _fading(self, carried: list[carrying.Carried]) -> Iterator[carrying.Carried]:
-        """Mattes away from their only drawing, which fade where it can be trusted no longer."""
+        """Yield mattes beyond the only drawing. They fade out over FADE frames once the confidence is below TRUSTED.
+
+        Args:
+            carried: The mattes, the nearest to the drawing first.
+        """
         share = 1.0
         for each in carried:
             if share < 1 or each.confidence < TRUSTED:
@@ -198,7 +237,7 @@ class CarriedMattes(SourceWrapper):
         return np.zeros((self.height, self.width), np.float32)
 
     def _path(self, index: int, first: int | None, last: int | None) -> Path:
-        """The file of a frame's matte, made of these drawings."""
+        """Return the file of a frame's matte that is made from these drawings."""
         key = derived.key({"version": VERSION, "frame": index, "drawn": self._drawn(first, last)})
         name = f"{index:08d}-{key}.png"
         if self._parent and derived.size_of(kept := self._parent / self._folder / name) is not None:
@@ -210,11 +249,11 @@ class CarriedMattes(SourceWrapper):
 
     @cached_property
     def _folder(self) -> str:
-        """The name of this footage's folder."""
+        """Return the name of the folder with this footage's mattes."""
         return f"{self.path.stem[:40]}-{derived.key(derived.identity(self._source))}"
 
     def _kept(self, path: Path) -> np.ndarray | None:
-        """The matte (H, W) uint8 of a file; None: there is none of ours, or it is damaged."""
+        """Return the matte (H, W) uint8 in a file, or None if the file is missing, damaged or not ours."""
         samples = derived.read(path, self._spec, CONFIDENCE)
         return None if samples is None else samples[..., 0]
 
@@ -238,7 +277,11 @@ _MAKING = Lock()  # or two threads would each make a folder
 
 @cache
 def _temporary() -> tempfile.TemporaryDirectory:
-    """Return a folder that is there until this program ends. MediaError: it cannot be made."""
+    """Return a folder that exists until this program ends.
+
+    Raises:
+        MediaError: It cannot be made.
+    """
     try:
         return tempfile.TemporaryDirectory(prefix=derived.MATTES, ignore_cleanup_errors=True)
     except OSError as error:
@@ -246,6 +289,9 @@ def _temporary() -> tempfile.TemporaryDirectory:
 
 
 def nearest(index: int, frames: Collection[int], reach: float = math.inf) -> tuple[int | None, int | None]:
-    """Return the nearest of some frames before and behind a frame, up to `reach` away; twice its own."""
+    """Return the nearest of `frames` before and after `index`, each None if there is none within `reach`.
+
+    If `index` is one of `frames`, both are `index`.
+    """
     before = max((frame for frame in frames if index - reach <= frame <= index), default=None)
     return before, min((frame for frame in frames if index <= frame <= index + reach), default=None)

@@ -1,17 +1,18 @@
-"""Mattes of the frames between two drawings of an outline, carried there by the footage's own motion.
+"""Makes mattes for the frames between two drawings of an outline, by the motion of the footage.
 
-Dense flow, joined from frame to frame, says where in each drawing's frame lies what a pixel shows. Where flow between
-the two frames alone, or the motion of the camera or of the subject, leads to what is more alike, that is believed. Each
-of them errs by a few pixels, so everything within REACH of that place votes, a vote counting by how alike the colours
-are around both ends (non-local means: Buades et al. 2005, "A non-local algorithm for image denoising"; votes for
-labels: Coupé et al. 2011, "Patch-based segmentation using expert priors"). Both drawings vote, the nearer with more
-weight.
+1. Motion. Dense optical flow from frame to frame is joined. For each pixel of a frame, it gives the matching place in
+   each drawing's frame. Other ways to find that place are the flow between the two frames alone, and the motions of the
+   camera and of the subject. A pixel takes another way where its colours match clearly better.
+2. Votes. Each way errs by a few pixels, so all places within REACH of the matching place vote on whether the pixel lies
+   inside. A vote weighs more the more alike the colours around both pixels are (non-local means: Buades et al. 2005, "A
+   non-local algorithm for image denoising"; votes for labels: Coupé et al. 2011, "Patch-based segmentation using expert
+   priors"). Both drawings vote. The nearer one has more weight.
+3. Edges. A guided filter fits the result to the edges of the picture (He et al. 2013).
+4. Soft edges. In linear light, a soft or blurred edge is a mixture of the colours on its two sides, so the matte there
+   is a linear function of the colours (Levin et al. 2008, "A closed-form solution to natural image matting"). The matte
+   becomes that function where the function fits.
 
-The result is refined by the edges of the picture (guided filter: He et al. 2013). Then, in linear light, in which soft
-edges and blurred ones are mixtures of what lies on their sides, it becomes what colours around a pixel explain of it:
-a linear function of them (Levin et al. 2008, "A closed-form solution to natural image matting"), as far as that fits.
-
-Flow and votes are found in pictures of at most WORKING pixels a side, edges in the whole picture.
+Steps 1 and 2 use a working picture of at most WORKING pixels a side. Steps 3 and 4 use the whole picture.
 """
 
 from collections.abc import Callable, Iterator
@@ -59,8 +60,12 @@ Places = np.ndarray  # (h, w, 2) float32, x and y in pixels of the working pictu
 
 @dataclass(frozen=True)
 class Drawing:
-    """A drawing of an outline: its source frame, and the share (h, w) float32 of each pixel of the working picture that
-    it covers."""
+    """A drawing of an outline.
+
+    Attributes:
+        frame: Its source frame.
+        cover: The share of each pixel of the working picture that it covers, (h, w) float32.
+    """
 
     frame: int
     cover: np.ndarray
@@ -68,30 +73,40 @@ class Drawing:
 
 @dataclass(frozen=True)
 class Carried:
-    """A matte (H, W) uint8 of a source frame.
+    """A matte that was carried to a frame.
 
-    confidence: 0 to 1; from one half on it overlaps with what a person draws by more than three quarters, as a rule"""
+    Attributes:
+        frame: Its source frame.
+        matte: (H, W) uint8.
+        confidence: 0 to 1. From 0.5 on, the matte usually overlaps by more than 75 % with what a person draws.
+    """
 
     frame: int
     matte: np.ndarray
     confidence: float
 
 
-# Frames as they are displayed: (H, W, 3) uint8 of a source frame.
+# Reads a source frame as it is displayed: (H, W, 3) uint8.
 Frames = Callable[[int], np.ndarray]
 
 
 def working_size(width: int, height: int) -> tuple[int, int]:
-    """Width and height of the picture in which flow is found."""
+    """Return the width and height of the working picture, in which flow is found, for a picture's size."""
     scale = min(1.0, WORKING / max(width, height))
     return max(round(width * scale), min(width, SLIM)), max(round(height * scale), min(height, SLIM))
 
 
 def carried(frames: Frames, first: Drawing | None, last: Drawing | None, span: range) -> Iterator[Carried]:
-    """The mattes of the frames of a span, which follow the first drawing's and precede the last's, in their order. One
-    of the drawings may be missing.
+    """Yield the mattes of the frames of a span, in order.
 
-    Frames are read twice, from first to last. Memory: flow and colours of the working picture, for each frame."""
+    This reads the frames twice, from first to last. It keeps flow and colours of the working picture for each frame.
+
+    Args:
+        frames: Reads a frame.
+        first: The drawing before the span. None: there is none.
+        last: The drawing after the span. None: there is none.
+        span: The frames. Without any drawing, nothing is yielded.
+    """
     ends = [each for each in (first, last) if each is not None]
     if not span or not ends:
         return
@@ -119,18 +134,25 @@ def carried(frames: Frames, first: Drawing | None, last: Drawing | None, span: r
 
 
 def drawn(picture: np.ndarray, cover: np.ndarray) -> np.ndarray:
-    """The matte (H, W) uint8 of a drawing in its own frame, refined as those that are carried.
+    """Return the matte (H, W) uint8 of a drawing in its own frame, refined like carried mattes.
 
-    picture: (H, W, 3) uint8; cover: see Drawing"""
+    Args:
+        picture: The frame, (H, W, 3) uint8.
+        cover: See Drawing.
+    """
     shown = lab(flow.resized(picture, cover.shape[::-1]))
     return flow.levels(refined(picture, _mixed([_votes(shown, shown, cover, box_around(cover, REACH))], [1.0])))
 
 
 @dataclass(frozen=True)
 class _Footage:
-    """Working pictures, by their source frames: colours (3, h, w) float32, and greys (h, w) uint8.
+    """The working pictures, by source frame.
 
-    moved: how many pixels a frame's places have moved since the frame before it (h, w)"""
+    Attributes:
+        colors: Their colours, as from `lab`.
+        greys: The same pictures in grey, (h, w) uint8, for optical flow.
+        moved: How many pixels each pixel has moved since the frame before, (h, w).
+    """
 
     colors: dict[int, np.ndarray] = field(default_factory=dict)
     greys: dict[int, np.ndarray] = field(default_factory=dict)
@@ -140,13 +162,21 @@ class _Footage:
         self.colors[frame], self.greys[frame] = lab(picture), cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
 
     def to(self, frame: int, other: int) -> Places:
-        """Where in another frame lies what a frame shows."""
+        """Return the place in another frame that matches each pixel of a frame."""
         grey = self.greys[frame]
         return flow.grid(*grey.shape) + flow.fine_vectors(grey, self.greys[other])
 
     def best(self, joined: Places, frame: int, end: Drawing) -> Places:
-        """Where in a drawing's frame lies what a frame shows: for each pixel, of all ways to know the one that leads to
-        what is most alike. The first is believed where others are hardly better."""
+        """Return the place in a drawing's frame that matches each pixel of a frame best.
+
+        Compare several candidates by colour: joined flow, flow between the two frames alone, and the affine motions of
+        the background and of the subject. Joined flow counts unless another one is clearly better (BETTER).
+
+        Args:
+            joined: The places that joined flow gives.
+            frame: The frame.
+            end: The drawing.
+        """
         picture = self.colors[frame]
         cover = _at(end.cover, joined)
         others = [self.to(frame, end.frame), *(_affine(joined, where) for where in (cover < 0.5, cover >= 0.5))]
@@ -160,10 +190,15 @@ class _Footage:
 
 
 def stillness(moved: np.ndarray, colors: np.ndarray, before: np.ndarray) -> np.ndarray:
-    """The share (h, w) of the matte of the frame before that a frame keeps: where nothing moves, and nothing looks
-    different, what differs is noise.
+    """Return how much of the last frame's matte each pixel keeps, (h, w), 0 to QUIET, so that mattes do not flicker.
 
-    moved: by how many pixels; colors, before: (3, h, w) its colours and those of the frame before"""
+    Where nothing moves and colours stay, any difference is noise.
+
+    Args:
+        moved: How many pixels each pixel has moved.
+        colors: The frame's colours, as from `lab`.
+        before: The colours of the frame before.
+    """
     still = np.clip(1.5 - moved / np.float32(STILL), 0, 1)
     differ = apart(colors, before)
     noise = float(np.median(differ[still > 0])) if still.any() else 0.0
@@ -171,12 +206,17 @@ def stillness(moved: np.ndarray, colors: np.ndarray, before: np.ndarray) -> np.n
 
 
 def apart(picture: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """How much colours (3, h, w) differ around each pixel."""
+    """Return how much the colours (3, h, w) of two pictures differ around each pixel, (h, w)."""
     return cv2.blur(np.abs(picture - other).sum(axis=0), (5, 5))
 
 
 def _affine(places: Places, where: np.ndarray) -> Places:
-    """The affine motion that most of the places in an area have, for the whole picture."""
+    """Fit an affine motion to the places in an area, and return the places that it gives in the whole picture.
+
+    Args:
+        places: The places that flow gives.
+        where: The area, bool (h, w). If it is too small, `places` is returned.
+    """
     grid = flow.grid(*where.shape)
     chosen = np.flatnonzero(where[::THIN, ::THIN])
     if chosen.size < LEAST:
@@ -189,8 +229,11 @@ def _affine(places: Places, where: np.ndarray) -> Places:
 def _joined(
     small: Frames, footage: _Footage, reading: range, first: Drawing | None, last: Drawing | None
 ) -> dict[tuple[int, int], Places]:
-    """Where in each drawing's frame lies what the frames between show, by (the drawing's frame, frame): flow from frame
-    to frame, joined. Adds these frames to the footage."""
+    """Join flow from frame to frame. Add the frames to `footage`.
+
+    Returns:
+        {(a drawing's frame, frame): the place in the drawing's frame that matches each pixel of the frame}.
+    """
     places: dict[tuple[int, int], Places] = {}
     forth: dict[int, Places] = {}
     for frame in reading:
@@ -213,13 +256,18 @@ def _joined(
     return places
 
 
-Votes = tuple[np.ndarray, np.ndarray]  # (h, w) each: the sum of those for a pixel's lying inside, and that of all
+Votes = tuple[np.ndarray, np.ndarray]  # per pixel, (h, w) each: the sum of votes for "inside", and of all votes
 
 
 def _votes(shown: np.ndarray, colors: np.ndarray, cover: np.ndarray, box: Box | None) -> Votes:
-    """Votes on each pixel of a picture, in a box: elsewhere none says that it lies inside.
+    """Return votes on whether each pixel of a frame lies inside the outline.
 
-    shown, colors: (3, h, w) its colours and those of the drawing's frame, carried into it, as cover (h, w) is"""
+    Args:
+        shown: The frame's colours, as from `lab`.
+        colors: The colours of the drawing's frame, carried into this frame.
+        cover: The drawing's cover, carried into this frame.
+        box: Where pixels may lie inside. None: nowhere.
+    """
     inside = np.zeros_like(cover)
     if box is None:
         return inside, np.ones_like(cover)
@@ -244,15 +292,26 @@ def _votes(shown: np.ndarray, colors: np.ndarray, cover: np.ndarray, box: Box | 
 
 
 def _mixed(sides: list[Votes], weights: list[float]) -> np.ndarray:
-    """The share (h, w) of all votes."""
+    """Return the share of votes for "inside" at each pixel, (h, w).
+
+    Args:
+        sides: The votes from each drawing.
+        weights: The weight of each drawing.
+    """
     shares = np.array(weights, np.float32)
     inside, total = (np.tensordot(shares, [side[part] for side in sides], axes=1) for part in (0, 1))
     return inside / total
 
 
 def _confidence(share: np.ndarray, sides: list[Votes]) -> float:
-    """How sure a matte is, by how alike what it covers is in the drawing where it is more so, and by how far two
-    drawings agree on it."""
+    """Return how sure a matte is, 0 to 1.
+
+    It is surer the more the subject looks as in one of the drawings, and the more two drawings agree on the matte.
+
+    Args:
+        share: As from `_mixed`.
+        sides: The votes from each drawing.
+    """
     inside = share > INSIDE
     if not inside.any():
         return float(len(sides) > 1)  # nothing is a matte where both agree on it
@@ -264,7 +323,15 @@ def _confidence(share: np.ndarray, sides: list[Votes]) -> float:
 
 
 def refined(picture: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """The matte (H, W) float32 of a picture (H, W, 3) uint8, from shares (h, w) of votes in the working picture."""
+    """Fit a matte to the edges and colours of the whole picture (steps 3 and 4 above).
+
+    Args:
+        picture: (H, W, 3) uint8.
+        share: The share of votes for "inside" in the working picture, (h, w).
+
+    Returns:
+        The matte, (H, W) float32, 0 to 1.
+    """
     height, width = picture.shape[:2]
     scale = width / share.shape[1]
     matte = np.zeros((height, width), np.float32)
@@ -287,9 +354,17 @@ _LIGHT = (255 * to_linear(np.arange(256) / 255)).astype(np.float32)
 
 
 def _explained(light: np.ndarray, values: np.ndarray, radius: int, coarse: int) -> np.ndarray:
-    """A matte (h, w) with what colours around each pixel explain of it, as a linear function of them.
+    """Replace a matte by a linear function of the colours around each pixel, where that function fits.
 
-    light: (h, w, 3) float32, 0 to 255; coarse: every so many pixels of a row tell the function"""
+    Args:
+        light: The picture in linear light, (h, w, 3) float32, 0 to 255.
+        values: The matte, (h, w), 0 to 1.
+        radius: How far around each pixel the function is fitted, in pixels.
+        coarse: Fit the function in a picture smaller by this factor.
+
+    Returns:
+        The new matte, (h, w).
+    """
     found = cv2.ximgproc.guidedFilter(light, values, radius, EXACT * 255**2, scale=1 / coarse)
 
     def mean(each: np.ndarray) -> np.ndarray:
@@ -302,14 +377,19 @@ def _explained(light: np.ndarray, values: np.ndarray, radius: int, coarse: int) 
 
 
 def lab(picture: np.ndarray) -> np.ndarray:
-    """Colours (3, h, w) float32 of a picture (h, w, 3) uint8."""
+    """Return the colours of a picture (h, w, 3) uint8 in CIE Lab with L halved, (3, h, w) float32."""
     lab = cv2.cvtColor(picture.astype(np.float32) / 255, cv2.COLOR_RGB2LAB)
     lab[..., 0] /= 2
     return np.ascontiguousarray(lab.transpose(2, 0, 1))
 
 
 def _at(values: np.ndarray, places: Places) -> np.ndarray:
-    """Values (h, w), (h, w, 2) or planes (3, h, w) at places; beyond the picture its edge goes on."""
+    """Return the values at some places. Beyond the picture, its edge repeats.
+
+    Args:
+        values: (h, w), (h, w, 2) or planes (3, h, w).
+        places: Where to look.
+    """
     if values.ndim == 3 and values.shape[0] == 3:
         return np.stack([_at(plane, places) for plane in values])
     return flow.look(values, places)
