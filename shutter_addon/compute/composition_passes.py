@@ -24,7 +24,13 @@ _ROWS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
 
 
 def composition(way: str, groups: int, **macros: int | str) -> Pass:
-    """Return the pass compose_<way> for `groups` of four shutters, with other macros that its shader names."""
+    """Return the pass compose_<way> from shaders/.
+
+    Args:
+        way: As from `way_of`.
+        groups: The number of groups of four shutters.
+        macros: More macros of the shader. They replace those that this function sets.
+    """
     lines = lines_of(way, is_median=macros.get("COMBINE") == MODES["median"])
     given: dict[str, int | str] = {"GROUPS": groups, "VALUE": int(way == "value"), "QUADS": lines // 4}
     return read_pass(f"compose_{way}", **(given | macros))

@@ -131,10 +131,10 @@ class Compositor(Protocol):
     takes_planes: bool
 
     def current(self) -> AbstractContextManager:
-        """Return a context manager in which all other methods are called (Device.current)."""
+        """Return the context manager inside which callers call all other methods (Device.current)."""
 
     def freeing(self) -> AbstractContextManager:
-        """Return a context manager in which windows and stages are released (Device.freeing)."""
+        """Return the context manager inside which callers release windows and stages (Device.freeing)."""
 
     def window(
         self, source: FrameSource, capacity: int, moved: bool = False, shutters: int = 4, summed: bool = True

@@ -59,12 +59,14 @@ def _noting(function: Callable[..., object], *arguments: object) -> None:
 
 
 def beside(steps: Iterable[T], patience: float | None) -> Generator[T | None, None, None]:
-    """Iterate on a thread that runs ahead.
+    """Iterate over `steps` on another thread, which runs ahead, and yield its results.
 
-    Closing the generator stops the thread at its next `stopping.check` and waits for it.
+    Closing the generator stops the thread at its next `stopping.check` and waits for it. What `steps` raises is raised
+    here.
 
     Args:
-        patience: Seconds without a result after which it yields None; None: it waits.
+        steps: What to iterate over.
+        patience: After so many seconds without a result, yield None and go on waiting. None: only yield results.
     """
     ended, results = threading.Event(), queue.SimpleQueue[tuple[T | None, Exception | None, bool]]()
     thread = daemon(_find, steps, ended, results)

@@ -97,12 +97,12 @@ class Texture:
     """A texture array on a device.
 
     Attributes:
-        device: the device. None: a small texture outside the budget.
+        device: the device. None: a small texture that the budget does not count.
         size: (width, height, layers) in texels
         kind: the format, as for Device.texture
         bytes: its size on the device
-        own: the texture of the device's library; None after `release`, and while the content is on the host
-        waiting: that content (layers, height, width, components)
+        own: the texture of the graphics library. None: it was released, or its content is on the host.
+        waiting: its content while that is on the host, to free the GPU's memory: (layers, height, width, components)
     """
 
     def __init__(self, device: Device | None, size: tuple[int, int, int], kind: str, own: Own = None) -> None:

@@ -181,7 +181,13 @@ def _asked(process: subprocess.Popen[bytes], question: bytes) -> tuple[dict, np.
 
 
 def _line(stream: IO[bytes]) -> bytes:
-    """Return the next answer's line without its beginning."""
+    """Read the next answer's line and return it without its mark ANSWER.
+
+    Skip other lines, which Blender itself prints.
+
+    Raises:
+        EOFError: The process has ended.
+    """
     while line := stream.readline():
         if line.startswith(ANSWER.encode()):
             return line.removeprefix(ANSWER.encode())

@@ -100,9 +100,10 @@ class MovieSource(FrameSource):
             return self._pixels(frame)
 
     def decoded(self, index: int) -> Decoded:
-        """Return the frame, or its planes in the decoder's memory if they are 8-bit 4:2:0 in BT.601 or 709.
+        """Return the frame as RGBA, or its planes if the GPU can convert them.
 
-        Planes have the frame's size, and are converted as libswscale does with SCALER.
+        Those are 8-bit 4:2:0 planes in BT.601 or BT.709 that need no scaling, rotation or deinterlacing. They are views
+        of the decoder's memory. Converted by their matrix, they equal `read` to the bit.
         """
         with self._named(index):
             frame = self._frame(index)

@@ -1,8 +1,10 @@
-"""The script that a second Blender runs to decode movies. It answers on stdout what it is asked on stdin.
+"""The script that a second Blender runs to decode movies. It reads questions on stdin and answers on stdout.
 
-It is no part of the extension there. A question is a line of JSON with `number`, `path` and `deinterlace` of a movie,
-and `wanted`: "about", "close", or a frame's index. A file may be open several times under different numbers. An answer
-is the script's last argument, a line of JSON, and as many bytes as its `bytes` says.
+That Blender does not load the extension. A question is a line of JSON with `number`, `path` and `deinterlace` of a
+movie, and `wanted`: "about", "close", or a frame's index. A file may be open several times under different numbers.
+
+An answer begins with a line: a mark, which is the script's last argument, and JSON. The JSON's `bytes` says how many
+bytes of a frame follow.
 """
 
 import contextlib
@@ -96,7 +98,7 @@ def _close(movies: dict[int, Movie], number: int) -> None:
 
 
 def main() -> None:
-    """Answer until stdin ends."""
+    """Answer questions from stdin until it ends."""
     # Nothing else that Blender prints may be taken for an answer.
     questions, answers = (os.fdopen(os.dup(number), mode) for number, mode in ((0, "rb"), (1, "wb")))
     os.dup2(os.open(os.devnull, os.O_RDWR), 1)

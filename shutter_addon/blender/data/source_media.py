@@ -159,7 +159,7 @@ def files(strip: Strip) -> list[Path]:
 
 
 def first_frame(strip: Strip) -> int:
-    """Return the frame of the footage at which the strip's content begins."""
+    """Return how many frames of a movie a clip strip skips at its beginning (*Frame Offset*); 0 for other strips."""
     return strip.clip.frame_offset if strip.type == "MOVIECLIP" and is_movie(strip) else 0
 
 

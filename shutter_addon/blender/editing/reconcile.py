@@ -188,7 +188,15 @@ def _place(strip: Strip) -> tuple[bool, int, int]:
 
 
 def _original(scene: Scene, effect_scene: Scene) -> PropertyGroup | None:
-    """Return the effect that a copied effect scene was made for, preferring those of the scene."""
+    """Return the effect whose effect scene was copied; look in `scene` first, then in other scenes.
+
+    Args:
+        scene: The scene with the strip that shows the copy.
+        effect_scene: The copy. It still has the original's identity.
+
+    Returns:
+        None if no scene has such an effect.
+    """
     identity = effect_scene.virtual_shutter.identity
     scenes = sorted(bpy.data.scenes, key=lambda other: other != scene)
     effects = (effect for other in scenes for effect in other.virtual_shutter.effects if effect.scene)
@@ -208,7 +216,7 @@ def _duplicate(effect: PropertyGroup, strip: Strip, effect_scene: Scene) -> None
 
 
 def _remove_effects(scene: Scene) -> None:
-    """Remove effects of a scene that no strip shows."""
+    """Remove effects of a scene that no strip shows. undelete.restore can bring them back."""
     group, shown = scene.virtual_shutter, {strip.scene for strip in strips.effect_strips(scene)}
     gone = [i for i, effect in enumerate(group.effects) if effect.scene not in shown]
     if gone:

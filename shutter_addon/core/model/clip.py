@@ -78,7 +78,10 @@ class Clip:
 
     @property
     def ends(self) -> tuple[float, float]:
-        """The first and the last position, which are repeated beyond; infinite: none is."""
+        """The positions (see `position`) of the strip's first and last frame, which the strip repeats beyond its ends.
+
+        Without a strip's timing they are −∞ and ∞: no frame repeats.
+        """
         if isinstance(self.timing, StripTiming):
             first, (length, _rate) = self.timing.start, self._content(self.timing)
             return float(first * self.step), float((first + length - 1) * self.step)

@@ -486,8 +486,8 @@ MESSAGES = {
     ("Operator", "Outline"): "Umriss",
     (
         "*",
-        "Make the active subject an outline, which is drawn where the subject has strokes",
-    ): "Das aktive Motiv zum Umriss machen, der dort gezeichnet ist, wo das Motiv Striche hat",
+        "Turn the active subject into an outline, with a drawing at each frame where you drew on the subject",
+    ): "Das aktive Motiv zum Umriss machen, mit einer Zeichnung an jedem Bild, an dem auf dem Motiv gezeichnet ist",
     ("*", "The subject has no outline there"): "Das Motiv hat dort keinen Umriss",
     ("*", 'strip "{strip}" has a scale of 0'): "Streifen „{strip}“ ist zu nichts skaliert",
     ("*", "{place}: a linear outline is not tracked"): "{place}: Ein linearer Umriss wird nicht verfolgt",

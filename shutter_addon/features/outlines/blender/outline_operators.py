@@ -118,7 +118,7 @@ def subject_scribble(_self: Operator, _context: Context, effect: PropertyGroup) 
 
 @operator("Outline", needs.a_subject, icon="CURVE_BEZCIRCLE", only_seen=True)
 def subject_outline(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
-    """Make the active subject an outline, which is drawn where the subject has strokes"""
+    """Turn the active subject into an outline, with a drawing at each frame where you drew on the subject"""
     if not subjects.to_outline(self.edit, effect, self.effect_strip, effect.active_region):
         report(self, rpt_("The subject has no outline there"))
         return {"CANCELLED"}

@@ -51,10 +51,10 @@ def is_first_stroke(effect: PropertyGroup, region: PropertyGroup) -> bool:
 
 
 def to_outline(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> bool:
-    """Make a subject an outline, which is drawn where the subject has strokes or drawings.
+    """Turn a subject into an outline, with a drawing at each frame that has strokes or drawings of the subject.
 
     Returns:
-        Whether it encloses anything.
+        Whether the outline encloses anything. If not, the subject stays.
 
     Raises:
         EffectError, MediaError: Its mattes cannot be made.

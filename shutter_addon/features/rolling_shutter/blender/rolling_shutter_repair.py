@@ -73,7 +73,7 @@ def _moment(shutter: PropertyGroup) -> float:
 
 
 def _shown(effect: PropertyGroup) -> int:
-    """Return the bar of the shown frame."""
+    """Return the index of the bar that exposes the shown frame when *Position* is *Center*."""
     return Options(validation.number(effect, "window"), position="center").before
 
 
