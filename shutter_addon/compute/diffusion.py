@@ -53,8 +53,14 @@ def diffuse(labels: np.ndarray, count: int, guide: np.ndarray | None = None, str
 
 
 class _Grid(NamedTuple):
-    """A grid's equations: conductances to the right (h, w − 1), down (h − 1, w) and to fixed cells (h, w); and 1 /
-    their sum, 0 for fixed cells."""
+    """The equations of a grid (h, w) of cells.
+
+    Attributes:
+        across: Conductances between a cell and the one to its right, (h, w − 1).
+        down: Conductances between a cell and the one below, (h − 1, w).
+        ground: Conductances between cells and fixed cells, (h, w).
+        inverse: 1 / the sum of a cell's conductances, 0 for fixed cells.
+    """
 
     across: np.ndarray
     down: np.ndarray

@@ -90,8 +90,10 @@ class EdgeDiffusion(Diffusion):
         return self._grids[0].textures["solution"]
 
     def _provide(self, cells: tuple[int, int]) -> None:
-        """Make the textures that plain diffusion lacks. Those of conjugate gradients are cleared, because sums include
-        tiles without free cells, which passes skip."""
+        """Make the textures that plain diffusion does not have.
+
+        Clear those of conjugate gradients: passes skip tiles without free cells, but sums include them.
+        """
         grid, finest = self._grids[self._solved], self._grids[0]
         vectors = dict.fromkeys(("residual", "guess", "direction", "answer"), (*grid.size, grid.layers))
         sizes = vectors | {"sums": (4, 1, grid.layers), "parts": (PARTS, 1, grid.layers)}

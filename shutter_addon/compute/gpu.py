@@ -315,8 +315,10 @@ class GPUCompositor:
         return selected, share
 
     def _draw_on_host(self, window: Handle, request: Request, coefficients: Coefficients) -> Texture:
-        """Draw with NumPy: medians of following exposures, which need all frames in one pass, and medians that take too
-        many loop iterations for a device."""
+        """Draw medians with NumPy that a device cannot draw.
+
+        Those of following exposures need all frames in one pass. Others take too many loop iterations for a device.
+        """
         host, source, options = cpu.CPUCompositor(), window.source, request.state.options
         frames = host.window(source)
         frames.load(window_frames.positions(request, window.shot), options, window.shot)

@@ -266,8 +266,12 @@ class Renderer:
         return self._window
 
     def _kind_for(self, request: Request) -> tuple[int, bool, int, bool]:
-        """Return the window's length, whether it is for following exposures, the number of all shutters, and whether
-        sums of frames are enough."""
+        """Return what the window has to be like, as arguments of Compositor.window.
+
+        Returns:
+            Its length in frames, whether its pictures have following exposures, the number of shutters, and whether
+            sums of frames are enough.
+        """
         exposing = self._exposing(request, self.labels(request)).state
         return request.state.options.window, exposing.following is not None, len(request.state.bars), exposing.averages
 

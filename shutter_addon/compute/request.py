@@ -58,9 +58,12 @@ class Coefficients(NamedTuple):
 
 
 class Exposure(NamedTuple):
-    """A composed layer, or what lies behind all: its picture, and a picture whose alpha is its share of the exposure.
+    """A composed layer, or what lies behind all layers. For opaque frames, both pictures are the same.
 
-    For opaque frames both are the same picture."""
+    Attributes:
+        color: Its picture.
+        share: A picture whose alpha is its share of the exposure.
+    """
 
     color: Handle
     share: Handle

@@ -316,8 +316,12 @@ def reason(error: Exception) -> str:
 
 
 def _tags(codec: VideoCodecContext) -> tuple[int, bool, int]:
-    """Return what Blender reads once from a file: the YUV matrix by its number in ITU-T H.273, whether samples have
-    full range, and the quarter turns counterclockwise by which pictures are stored."""
+    """Return a movie's tags that Blender reads once, for all frames.
+
+    Returns:
+        The YUV matrix by its number in ITU-T H.273, whether samples have full range, and the quarter turns
+        counterclockwise by which pictures are stored.
+    """
     # libswscale assumes BT.601 for matrices that it does not know.
     space = {1: 1, 4: 4, 7: 7, 9: 9, 10: 9}.get(int(codec.colorspace), 5)
     side_data = getattr(codec, "coded_side_data", {})  # missing before PyAV 19: pictures are not turned then

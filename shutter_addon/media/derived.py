@@ -1,7 +1,7 @@
-"""What is made from footage and kept as files: mattes of outlines, and vectors of optical flow.
+"""Files that are made from footage and kept: mattes of outlines, and vectors of optical flow.
 
-One rule holds for their folders: we choose the names, no link is followed, and nothing else is opened or removed. What
-a frame is made of is in the name of its file, or of the folder; so what changes gets another one.
+In their folders, only files with names of ours are opened or removed, and links are never followed. The name of a file,
+or of its folder, has a hash of everything that the file is made from. So after a change, another file is used.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from .image_writing import write_exr
 VECTORS = "virtual_shutter_vectors"  # the folder of StoredVectors
 MATTES = "virtual_shutter_mattes"  # the folder of carried mattes
 WHOLE = 8 << 20  # bytes; files of a source up to this size, such as uncompressed 8-bit HD pictures, are hashed whole
-BLOCKS, BLOCK = 16, 4096  # of a larger file so many blocks, of so many bytes each, are hashed
-_LARGER = 1 << 20  # bytes; a file that is larger than its samples by more holds something else
+BLOCKS, BLOCK = 16, 4096  # how many blocks of a larger file are hashed, and the bytes of each
+_LARGER = 1 << 20  # bytes; a file of ours is not larger than twice its samples plus this
 
 _CHANNELS = tuple(f"value{k}" for k in range(6))  # of a file of vectors
 
@@ -37,10 +37,13 @@ _SHAPE = "roi", "roi_full", "channelnames", "format", "channelformats", "deep"
 
 
 def identity(source: FrameSource) -> dict:
-    """What tells a source from others, wherever its files lie: their content, and how they are read. A change in a
-    file larger than 8 MiB goes unnoticed if it keeps the size and 16 blocks of 4 KiB.
+    """Return what tells a source from others, wherever its files lie: their content, and how they are read.
 
-    MediaError: a file is gone."""
+    A change in a file larger than WHOLE goes unnoticed if it keeps the size and all blocks that are hashed.
+
+    Raises:
+        MediaError: A file is gone.
+    """
     content = hashlib.sha256()
     for path in source.files:
         content.update(content_digest(path))
@@ -53,14 +56,20 @@ def identity(source: FrameSource) -> dict:
 
 
 def key(made_of: dict) -> str:
-    """What a name has of what is made of that."""
+    """Return a short hash, for a file's name, of everything that the file is made from."""
     return hashlib.sha256(json.dumps(made_of, sort_keys=True).encode()).hexdigest()[:12]
 
 
 def content_digest(path: Path, whole: int = WHOLE) -> bytes:
-    """32 bytes that tell a file's content from others'; `identity` has the same of a source's files.
+    """Return a hash of a file's content, 32 bytes.
 
-    whole: files of more bytes are told by their size and by blocks spread over them. MediaError: it is gone."""
+    Args:
+        path: The file.
+        whole: Of a file with more bytes, only the size and blocks spread over it are hashed.
+
+    Raises:
+        MediaError: The file is gone.
+    """
     try:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):  # a pipe would never end
@@ -72,7 +81,7 @@ def content_digest(path: Path, whole: int = WHOLE) -> bytes:
 
 @lru_cache(maxsize=1 << 17)  # a sequence of an hour and a half
 def _hash(path: Path, size: int, _mtime: int, whole: int) -> bytes:
-    """The SHA-256 of a file's content; of a file over `whole`, that of its size and of blocks spread over it."""
+    """Return the SHA-256 of a file's content or, over `whole` bytes, of its size and of blocks spread over it."""
     with path.open("rb") as file:
         if size <= whole:
             return hashlib.file_digest(file, "sha256").digest()
@@ -84,7 +93,7 @@ def _hash(path: Path, size: int, _mtime: int, whole: int) -> bytes:
 
 
 def size_of(path: Path) -> int | None:
-    """The bytes of a frame's file, which is not opened; None: it is not there. A link is none."""
+    """Return the size of a frame's file in bytes without opening it, or None if there is no file. A link is no file."""
     with suppress(OSError):
         status = path.lstat()
         return status.st_size if stat.S_ISREG(status.st_mode) else None
@@ -92,8 +101,12 @@ def size_of(path: Path) -> int | None:
 
 
 def opened(path: Path, spec: ImageSpec) -> ImageInput | None:
-    """A frame's opened file. None: it is not there, is damaged, or has not exactly the size and samples of `spec`, as
-    a file that somebody else has put there may have millions of pixels."""
+    """Open a frame's file.
+
+    Returns:
+        None if the file is missing or damaged, or does not have exactly the size and samples of `spec`. A file that
+        somebody else has put there may have millions of pixels.
+    """
     size = size_of(path)
     if size is None or size > 2 * spec.image_bytes() + _LARGER:
         return None
@@ -109,8 +122,16 @@ def opened(path: Path, spec: ImageSpec) -> ImageInput | None:
 
 
 def read(path: Path, spec: ImageSpec, description: str = "") -> np.ndarray | None:
-    """A frame's samples (height, width, channels), of the type of `spec`. None: as `opened`, what is in it is damaged,
-    or its description does not begin so."""
+    """Read a frame's samples.
+
+    Args:
+        path: The file.
+        spec: The size and samples that the file must have.
+        description: What the file's description must begin with.
+
+    Returns:
+        (height, width, channels), of the type of `spec`. None if the file is missing, damaged or not such a file.
+    """
     if (image := opened(path, spec)) is None:
         return None
     with closing(image), suppress(UnicodeDecodeError):
@@ -123,7 +144,7 @@ def read(path: Path, spec: ImageSpec, description: str = "") -> np.ndarray | Non
 
 
 def own_folder(path: Path) -> None:
-    """Make a folder of ours, if there is none. The one that it lies in may be a link to another disk.
+    """Make a folder of ours if it is missing. The folder that it lies in may be a link to another disk.
 
     Raises:
         OSError: It cannot be made, or it is a link itself.
@@ -139,15 +160,20 @@ def refuse_link(path: Path) -> None:
 
 
 class StoredVectors:
-    """The vectors of pairs of frames: those of a folder, and others found as they are asked for."""
+    """Gives the vectors of pairs of frames: from a folder, or found now."""
 
     def __init__(self, folder: Path, writes: bool) -> None:
-        """writes: whether what is found is kept, as far as the folder can be written to"""
+        """Use a folder.
+
+        Args:
+            folder: The folder, which may be missing.
+            writes: Whether to keep vectors there, if it can be written to.
+        """
         self._folder, self._writes = folder, writes
         self._is_new = True  # nothing was written yet
 
     def found(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """What flow.found gives of two pictures."""
+        """Return what flow.found returns for two pictures."""
         digest = hashlib.blake2b(f"{flow.VERSION} {first.shape}".encode(), digest_size=16)
         for picture in (first, second):
             digest.update(picture)
@@ -159,7 +185,7 @@ class StoredVectors:
         return values
 
     def _kept(self, path: Path, shape: tuple[int, ...]) -> np.ndarray | None:
-        """What is in a file; None: there is none of ours, or it is damaged."""
+        """Return the vectors in a file, or None if the file is missing, damaged or not ours."""
         height, width = (-(-n // STEP) for n in shape)
         spec = ImageSpec(width, height, len(_CHANNELS), "half")
         spec.channelnames = _CHANNELS

@@ -1,9 +1,11 @@
-"""Frames between two frames, by optical flow (appendix B).
+"""Makes new frames between two frames (moments), by optical flow (appendix B).
 
-The flow comes from OpenCV, in both directions. Each of its vectors carries a pixel to where it is at the time of the
-new frame; where several arrive, the one whose two ends look alike wins (Baker et al. 2011, "A database and evaluation
-methodology for optical flow"). Along what has arrived, both frames are looked up and mixed, which takes longest. So a
-part of the picture has only as many of these key moments as its motion needs; the moments between them are mixes.
+OpenCV finds the flow in both directions. Each vector carries a pixel to its place at the time of the new frame. Where
+several vectors arrive at one place, the one whose two ends look most alike wins (Baker et al. 2011, "A database and
+evaluation methodology for optical flow"). The vectors that arrive say where to look up both frames, which are mixed.
+
+This takes longest. So it happens only for key moments, as many as the motion in each tile of the picture needs. Other
+moments are mixes of the key moments before and after them.
 """
 
 from __future__ import annotations
@@ -23,10 +25,10 @@ from .opencv import cv2
 
 SMALLEST = 16  # pixels; OpenCV's flows need about as many, smaller pictures are cross-faded
 HALF_MAX = 65504  # the largest value of a half float, which infinite samples count as
-# Levels of 255 by which the ends of a vector may differ that carries something, in pictures that are GREY on average or
-# brighter; in darker ones in proportion, but for noise.
+# The most levels of 255 by which the ends of a good vector differ, in pictures with a mean of GREY or more. In darker
+# pictures it is less in proportion, but at least NOISE.
 UNLIKE, GREY, NOISE = 24.0, 90.0, 4.0
-SHARED = 0.5  # of all vectors, in both directions, have to
+SHARED = 0.5  # the share of vectors, in each direction, that have to be good
 # Where nothing moves farther than STILL between two frames, in 1 / UNIT of a pixel, moments are mixes of both frames.
 # Up to MOVES, one key moment lies between them; each doubling of the distance doubles the key moments.
 STILL, MOVES = UNIT // 8, 2 * UNIT
@@ -35,7 +37,7 @@ VERSION = 1  # raise it when `found` gives something else of the same pictures
 
 
 class Between:
-    """What lies between two frames: a function of the two alone, the same bits whatever the number of cores."""
+    """Makes the moments between two frames. They depend on these frames only, not on the number of cores."""
 
     def __init__(
         self,
@@ -45,9 +47,15 @@ class Between:
         alpha: str = "opaque",
         find: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
     ) -> None:
-        """first, second: arrays (height, width, 4) of a FrameSource's dtype
-        transfer, alpha: how samples are encoded, as FrameSource says; the new frames are encoded alike
-        find: gives what `found` gives; None: that"""
+        """Find the flow between two frames.
+
+        Args:
+            first: (height, width, 4), of a FrameSource's dtype.
+            second: Like `first`.
+            transfer: How samples are encoded, as in FrameSource. New frames are encoded like these.
+            alpha: Likewise.
+            find: Finds vectors, like `found`. None: `found` itself.
+        """
         self.ends, self._transfer, self._alpha = (first, second), transfer, alpha
         self._sides: list[_Carriers] | None = None
         self._paths: RecentValues[int, tuple[np.ndarray, np.ndarray]] = RecentValues()
@@ -58,7 +66,7 @@ class Between:
             self._sides = sides if _meet(pictures, sides) else None
 
     def with_ends(self, first: np.ndarray, second: np.ndarray) -> Between:
-        """Return what lies between two other frames that move alike."""
+        """Return a copy that applies the same flow to two other frames."""
         other = copy(self)
         other.ends, other._samples = (first, second), RecentValues()
         other.__dict__.pop("_encoded", None)
@@ -109,24 +117,37 @@ class Between:
 
 
 def luma(frame: np.ndarray, transfer: str, alpha: str) -> np.ndarray:
-    """A frame (H, W, 4) of a source, as it is displayed, in grey (H, W) uint8; transfer, alpha: the source's."""
+    """Convert a source's frame (H, W, 4) to grey display values (H, W) uint8.
+
+    Args:
+        frame: The frame.
+        transfer: As in FrameSource.
+        alpha: As in FrameSource.
+    """
     if frame.dtype == np.uint8 and (transfer, alpha) == ("srgb", "opaque"):
         return cv2.cvtColor(frame, cv2.COLOR_RGBA2GRAY)
     return cv2.cvtColor(displayed(frame, transfer, alpha), cv2.COLOR_RGB2GRAY)
 
 
 def displayed(frame: np.ndarray, transfer: str, alpha: str) -> np.ndarray:
-    """A frame (H, W, 4) of a source, as it is displayed, in colours (H, W, 3) uint8; transfer, alpha: the source's."""
+    """Convert a source's frame (H, W, 4) to display values (H, W, 3) uint8. Arguments as for `luma`."""
     return np.ascontiguousarray(levels(_encoded(frame, transfer, alpha))[..., :3])
 
 
 def resized(picture: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """A picture made smaller, of this width and height; of that size already, itself."""
+    """Return a picture made smaller, or the picture itself if it has this size (width, height) already."""
     return picture if picture.shape[1::-1] == size else cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
 
 
 def of_rows(frame: np.ndarray, source: FrameSource, most: int, *, turned: bool = False) -> np.ndarray:
-    """A source's frame as `luma` has it, made smaller where it has more rows; turned: its columns are the rows."""
+    """Return a source's frame in grey, as from `luma`, and reduced to `most` rows if it has more.
+
+    Args:
+        frame: The frame.
+        source: Its source.
+        most: The most rows.
+        turned: Swap rows and columns first.
+    """
     picture = luma(frame, source.transfer, source.alpha)
     picture = np.ascontiguousarray(picture.T) if turned else picture
     height, width = picture.shape
@@ -135,19 +156,26 @@ def of_rows(frame: np.ndarray, source: FrameSource, most: int, *, turned: bool =
 
 
 def vectors(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Where the pixels of a small picture (H, W) uint8 go in another one, quickly: vectors (H, W, 2) in pixels."""
+    """Find the optical flow from a small grey picture (H, W) uint8 to another, quickly.
+
+    Returns:
+        For each pixel of the first picture, the vector to its place in the second: (H, W, 2), x and y in pixels.
+    """
     return _dis(first, second, stride=4)
 
 
 def fine_vectors(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """As `vectors`, more exactly at the edges of what moves, which takes a third longer."""
+    """Find optical flow like `vectors`, but more exactly at the edges of moving things. It takes a third longer."""
     return _dis(first, second, stride=3, smoothness=10)
 
 
 def found(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """What tells how two pictures (H, W) uint8 go into each other: float16 (⌈H / STEP⌉, ⌈W / STEP⌉, 6). For every
-    STEPth pixel of the first, the vector to the second, x and y in pixels, and its cost: how much, in levels, the two
-    ends differ; then the same from the second to the first."""
+    """Find the optical flow between two pictures (H, W) uint8 in both directions, for every STEPth pixel.
+
+    Returns:
+        float16 (⌈H / STEP⌉, ⌈W / STEP⌉, 6): the vector from the first picture to the second (x and y in pixels) and its
+        cost, then the same from the second to the first. The cost is the difference of the vector's two ends in levels.
+    """
     height, width = first.shape
     shape = -(-height // STEP), -(-width // STEP)
     if min(height, width) < SMALLEST:
@@ -166,17 +194,22 @@ def found(first: np.ndarray, second: np.ndarray) -> np.ndarray:
 
 
 def _half(picture: np.ndarray) -> np.ndarray:
-    """A picture of half the size, in which each pixel is the mean of four."""
+    """Return a picture of half the size, in which each pixel is the mean of four."""
     height, width = picture.shape
     even = cv2.copyMakeBorder(picture, 0, height % 2, 0, width % 2, cv2.BORDER_REPLICATE)
     return resized(even, (even.shape[1] // 2, even.shape[0] // 2))
 
 
 def _dis(first: np.ndarray, second: np.ndarray, stride: int, smoothness: float = 20, quick: bool = False) -> np.ndarray:
-    """Vectors (H, W, 2) from the first picture's pixels to the second's.
+    """Run OpenCV's DIS optical flow. Return the vectors (H, W, 2) from the first picture's pixels to the second's.
 
-    stride: from a patch to the next, in pixels; smoothness: of the vectors (OpenCV's alpha)
-    quick: they are refined less, which takes half as long and costs moments nothing"""
+    Args:
+        first: (H, W) uint8.
+        second: Like `first`.
+        stride: Pixels from a patch to the next.
+        smoothness: Of the vectors (OpenCV's alpha).
+        quick: Refine vectors less. This takes half the time, and moments look as good.
+    """
     # A new one each time: it keeps buffers, which threads must not share.
     dis = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
     dis.setFinestScale(0)
@@ -196,7 +229,7 @@ _Carriers = tuple[np.ndarray, np.ndarray, np.ndarray]  # places (n, 2), vectors 
 
 
 def _meet(pictures: list[np.ndarray], sides: list[_Carriers]) -> bool:
-    """Whether two pictures have anything in common: enough vectors have ends that look alike."""
+    """Return whether two pictures show the same things: enough vectors have ends that look alike."""
     brightness = max(float(each.mean()) for each in pictures)
     unlike = max(UNLIKE * min(brightness / GREY, 1.0), NOISE)
     return min(float((costs <= unlike).mean()) for _places, _vectors, costs in sides) >= SHARED
@@ -232,8 +265,18 @@ def _paths(sides: list[_Carriers], shape: tuple[int, ...], t: float) -> np.ndarr
 def _carry(
     places: np.ndarray, vectors: np.ndarray, costs: np.ndarray, shape: tuple[int, ...], t: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """On every STEPth pixel of a picture of that shape at time t: vectors (h, w, 2) and costs (h, w), infinite where
-    nothing arrives."""
+    """Carry vectors to a time.
+
+    Args:
+        places: See _Carriers, as for `vectors` and `costs`.
+        vectors: Likewise.
+        costs: Likewise.
+        shape: Of the picture, (H, W).
+        t: The time, from 0 at the first frame to 1 at the second.
+
+    Returns:
+        The vectors (h, w, 2) that arrive at every STEPth pixel, and their costs (h, w), infinite where none arrives.
+    """
     h, w = (-(-n // STEP) for n in shape)
     cells = np.floor((places + np.float32(t) * vectors) / STEP).astype(np.int32)
     # A margin of two takes what leaves the picture.
@@ -252,7 +295,7 @@ def _carry(
 
 
 def _carriers(side: np.ndarray) -> _Carriers:
-    """Those of a side of `found`."""
+    """Return the carriers from the three values of one direction in the result of `found`."""
     values = side.reshape(-1, 3)
     # As whole numbers, which NumPy sorts ten times as fast; costs are not negative.
     order = np.argsort(~values[:, 2].view(np.uint16), kind="stable")
@@ -263,7 +306,7 @@ def _carriers(side: np.ndarray) -> _Carriers:
 
 
 def _filled(vectors: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Vectors (h, w, 2) whose unknown ones are the mean of what is known around, from the coarser picture."""
+    """Fill unknown vectors (h, w, 2) with the mean of known ones around them, from coarser and coarser pictures."""
     if known.all() or not known.any():
         return vectors
     weight = known.astype(np.float32)
@@ -275,9 +318,9 @@ def _filled(vectors: np.ndarray, known: np.ndarray) -> np.ndarray:
 
 
 def _mixed(ends: list[np.ndarray], vectors: np.ndarray, key: int, keys: int) -> np.ndarray:
-    """Return the display values of a key moment: both frames looked up along the paths, and mixed.
+    """Return the display values of a key moment: both frames, looked up along the paths and mixed.
 
-    They are uint16 for frames of whole numbers.
+    The values are uint16 for frames of whole numbers.
 
     Places are whole numbers of 1 / UNIT of a pixel, so that all devices look up the same ones
     (shaders/include/moment.glsl).
@@ -301,7 +344,11 @@ def _mixed(ends: list[np.ndarray], vectors: np.ndarray, key: int, keys: int) -> 
 
 
 def _spread(values: np.ndarray, height: int, width: int) -> np.ndarray:
-    """Values (h, w, C) of every STEPth pixel for all pixels, STEP² times as large: int32 (H, W, C)."""
+    """Interpolate values (h, w, C) of every STEPth pixel for all pixels.
+
+    Returns:
+        int32 (H, W, C): the interpolated values, times STEP².
+    """
     spread = values.astype(np.int32)
     for axis, length in ((0, height), (1, width)):
         before, share = np.divmod(np.arange(length, dtype=np.int32), STEP)
@@ -312,20 +359,26 @@ def _spread(values: np.ndarray, height: int, width: int) -> np.ndarray:
 
 
 def _cubic(picture: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """The picture (H, W, C) at places (H, W, 2) in 1 / UNIT of a pixel; its edge goes on beyond it."""
+    """Return a picture's values (H, W, C) at places (H, W, 2) in 1 / UNIT of a pixel, by cubic interpolation.
+
+    Beyond the picture, its edge repeats.
+    """
     whole, part = (places >> 5).astype(np.int16), (places & (UNIT - 1)).astype(np.uint16)
     fraction = part[..., 1] << 5 | part[..., 0]  # of OpenCV's table of weights
     return cv2.remap(picture, whole, fraction, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
 
 
 def look(picture: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """The picture (H, W, …) at places (h, w, 2), x and y in pixels; its edge goes on beyond it."""
+    """Return a picture's values at places (h, w, 2), x and y in pixels, by linear interpolation.
+
+    Beyond the picture, its edge repeats.
+    """
     return cv2.remap(picture, places, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
 
 
 @lru_cache(maxsize=2)  # 16 MB at 4K, and a fourth of that
 def grid(height: int, width: int) -> np.ndarray:
-    """The places (H, W, 2) of all pixels."""
+    """Return the places (H, W, 2) of all pixels, x and y."""
     return np.dstack(np.meshgrid(*(np.arange(n, dtype=np.float32) for n in (width, height))))
 
 
@@ -333,7 +386,10 @@ def grid(height: int, width: int) -> np.ndarray:
 
 
 def _encoded(frame: np.ndarray, transfer: str, alpha: str) -> np.ndarray:
-    """A FrameSource's frame as that: (H, W, 3) where it is opaque, in its own whole numbers or as float32."""
+    """Convert a FrameSource's frame to premultiplied display values: (H, W, 3) if it is opaque, else (H, W, 4).
+
+    Opaque display values of whole numbers stay as they are. All others become float32.
+    """
     if alpha == "opaque" and transfer == "srgb" and frame.dtype.kind == "u":
         return np.ascontiguousarray(frame[..., :3])
     white = np.iinfo(frame.dtype).max if frame.dtype.kind == "u" else 1
@@ -347,7 +403,7 @@ def _encoded(frame: np.ndarray, transfer: str, alpha: str) -> np.ndarray:
 
 
 def levels(samples: np.ndarray) -> np.ndarray:
-    """Samples as levels of 8 bits."""
+    """Convert samples to 8-bit levels."""
     if samples.dtype == np.uint16:
         return (samples >> 8).astype(np.uint8)
     if samples.dtype != np.uint8:
@@ -367,13 +423,13 @@ def _light(samples: np.ndarray) -> np.ndarray:
 
 @cache
 def _table(dtype: np.dtype) -> np.ndarray:
-    """Light of all display values of a whole-number type."""
+    """Return the linear light of every display value of a whole-number type."""
     white = np.iinfo(dtype).max
     return light.to_linear(np.arange(white + 1) / white).astype(np.float32)
 
 
 def _decoded(frame: np.ndarray, dtype: np.dtype, transfer: str, alpha: str) -> np.ndarray:
-    """Linear, premultiplied light as a FrameSource's frame."""
+    """Convert linear, premultiplied light to a FrameSource's frame."""
     convert = light.to_encoded if transfer == "srgb" else np.asarray
     if alpha == "opaque":
         frame = np.dstack([convert(frame), np.ones(frame.shape[:2], np.float32)])

@@ -1,7 +1,6 @@
-"""Curves around what a matte covers; and a proposal of an outline, by colours: of what a stroke runs over, or what a
-lasso is drawn around.
+"""Finds outlines: traces the curves around a matte, and proposes the outline of a subject from a stroke or a lasso.
 
-GrabCut (Rother et al. 2004) tells the colours of the subject from those around it, and keeps to edges.
+Proposals use GrabCut (Rother et al. 2004), which separates the colours of the subject from those around it along edges.
 """
 
 import numpy as np
@@ -11,7 +10,8 @@ from . import opencv
 from .opencv import cv2
 
 ROUNDS = 6
-# Of what is drawn: beyond that it is no subject; within that it may be; of a lasso, so deep inside it surely is.
+# A stroke's subject lies within REACH of the stroke's size, probably within NEAR of that. Of a lasso's subject, pixels
+# deeper than DEEP of the lasso's greatest depth are certain.
 REACH, NEAR, DEEP = 1.0, 0.15, 0.6
 MARGIN = 0.06  # of a lasso's size, by which it may have missed the subject
 
@@ -20,10 +20,19 @@ SPOT = 6.0  # pixels: what covers no more of them is no part of a subject
 
 
 def proposed(picture: np.ndarray, drawn: np.ndarray, *, encloses: bool) -> Curves:
-    """Curves (core.model.outlines) around the subject of a picture (H, W, 3) uint8; none where it has none.
+    """Propose the outline of a subject.
 
-    drawn: (h, w) bool, of carrying.working_size: what strokes cover, or what they enclose
-    MediaError: OpenCV is missing."""
+    Args:
+        picture: (H, W, 3) uint8.
+        drawn: What strokes cover, or what a lasso encloses: (h, w) bool, of carrying.working_size.
+        encloses: Whether it is a lasso.
+
+    Returns:
+        Curves (core.model.outlines) around the subject; none if there is no subject.
+
+    Raises:
+        MediaError: OpenCV is missing.
+    """
     opencv.check("outlines are proposed by")
     if not drawn.any():
         return ()
@@ -41,7 +50,7 @@ def proposed(picture: np.ndarray, drawn: np.ndarray, *, encloses: bool) -> Curve
 
 
 def _along(drawn: np.ndarray) -> np.ndarray:
-    """GrabCut's labels (h, w) uint8 of a subject that a stroke runs over."""
+    """Return GrabCut's labels (h, w) uint8 for a subject under a stroke."""
     away = cv2.distanceTransform((~drawn).astype(np.uint8), cv2.DIST_L2, 3)
     reach = max(REACH * _extent(drawn), NEAR * len(drawn))
     labels = np.full(drawn.shape, cv2.GC_BGD, np.uint8)
@@ -52,7 +61,7 @@ def _along(drawn: np.ndarray) -> np.ndarray:
 
 
 def _enclosed(drawn: np.ndarray) -> np.ndarray:
-    """GrabCut's labels (h, w) uint8 of a subject that a lasso is drawn around."""
+    """Return GrabCut's labels (h, w) uint8 for a subject inside a lasso."""
     margin = max(3, round(MARGIN * _extent(drawn)))
     around = cv2.dilate(drawn.astype(np.uint8), np.ones((2 * margin + 1,) * 2, np.uint8)) > 0
     deep = cv2.distanceTransform(drawn.astype(np.uint8), cv2.DIST_L2, 3)
@@ -64,16 +73,23 @@ def _enclosed(drawn: np.ndarray) -> np.ndarray:
 
 
 def _extent(drawn: np.ndarray) -> int:
-    """The larger side of the box around it, in pixels."""
+    """Return the larger side of the box around what is drawn, in pixels."""
     return max(int(np.ptp(np.flatnonzero(drawn.any(axis=axis)))) + 1 for axis in (0, 1))
 
 
 def traced(matte: np.ndarray, off: float = 0.5) -> Curves:
-    """Curves (core.model.outlines) around what a matte covers by more than half, the largest first; holes have their
-    own.
+    """Trace the curves around all pixels that a matte covers by more than half.
 
-    matte: (height, width) float32, 0 to 1; off: how far curves may be from its contours, in pixels
-    MediaError: OpenCV is missing."""
+    Args:
+        matte: (height, width) float32, 0 to 1.
+        off: How far curves may be from the exact contours, in pixels.
+
+    Returns:
+        Curves (core.model.outlines), the largest first. Holes have curves of their own.
+
+    Raises:
+        MediaError: OpenCV is missing.
+    """
     opencv.check("outlines are traced by")
     rows, columns = (np.flatnonzero(matte.max(axis=axis) > 0.5) for axis in (1, 0))
     if not rows.size:

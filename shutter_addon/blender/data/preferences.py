@@ -69,7 +69,7 @@ def gpu_memory() -> int:
 
 
 def model() -> Path:
-    """The file of the model that finds subjects."""
+    """Return the file of the model that finds subjects."""
     chosen = getattr(_preferences(), "model", "")
     return Path(bpy.path.abspath(chosen)).expanduser() if chosen else MODEL
 

@@ -39,8 +39,7 @@ class SHUTTER_OT_full_quality(Named, Operator):
 
 
 def _shown(context: Context) -> tuple[Window, Area, preview_areas.Shown] | None:
-    """Return window, area and content of the preview to use, preferring the context's; None: no preview shows an
-    effect."""
+    """Return the window, area and content of a preview that shows an effect, preferring the context's, or None."""
     areas = sorted(preview_areas.previews(context), key=lambda pair: pair[1] != context.area)
     for window, area in areas:
         with preview_areas.within(window, area):

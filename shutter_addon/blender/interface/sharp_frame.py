@@ -34,8 +34,10 @@ def _choose(context: Context, tool: str) -> bool:
 
 
 def show(context: Context) -> None:
-    """Show the source of the active effect in previews that have its annotation, if it is unmuted and on the same
-    level."""
+    """Show the active effect's source in previews that have its annotation.
+
+    Do nothing if the source is muted, or does not lie in the same meta strip as the effect.
+    """
     active = selection.active(context)
     source = active and strips.nearest_source(*active)
     if source is None or source.mute or source.parent_meta() != active[2].parent_meta():

@@ -209,11 +209,16 @@ class OutlineRegion(MatteRegion):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SubjectRegion(MatteRegion):
-    """A region whose matte is a subject that a model finds under strokes. It moves about the centre of these or,
-    without any, of its outlines.
+    """A region whose matte is a subject that a model finds under strokes.
 
-    drawings: strokes on the subject; nots: strokes on what it is not; outlines: closed curves, which overrule the model
-    content: a channel of mattes.FileFrame"""
+    It moves about the centre of its strokes or, without strokes, of its outlines.
+
+    Attributes:
+        drawings: Strokes on the subject.
+        nots: Strokes on what is not the subject (*Not This*).
+        outlines: Closed curves. They overrule the model.
+        content: A channel of mattes.FileFrame.
+    """
 
     drawings: Drawings
     nots: Drawings
@@ -224,7 +229,11 @@ class SubjectRegion(MatteRegion):
         return self.drawings if self.drawings.frames else self.outlines
 
     def drawn_at(self, frame: float) -> scribbles.Shape:
-        """The strokes that are drawn at a frame, as lines. EffectError: they are nowhere near the picture."""
+        """Return the strokes that are drawn at this frame, as lines.
+
+        Raises:
+            EffectError: They lie too far outside the picture.
+        """
         strokes = tuple(self.drawings.at(frame)) if frame in self.drawings.frames else ()
         return scribbles.Shape(shutter=self.shutter, kind="line", width=0.0, strokes=strokes)
 

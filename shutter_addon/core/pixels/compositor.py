@@ -30,8 +30,15 @@ def mixed_shutter(state: FrameState, coefficients: ArrayLike) -> np.ndarray:
 
 
 def ways(state: FrameState, coefficients: np.ndarray) -> Iterator[tuple[list[int], np.ndarray, np.ndarray]]:
-    """Yield, for each way to combine frames, its shutters, their share of coefficients (N, …) ≥ 0, and their own
-    coefficients (n, …), Σ = 1."""
+    """Yield the shutters of each way to combine frames (*Combine*).
+
+    Args:
+        state: The effect at a frame.
+        coefficients: Of all shutters, (N, …) ≥ 0.
+
+    Yields:
+        The indices of n shutters, the sum of their coefficients, and these scaled to a sum of 1, (n, …).
+    """
     for chosen in map(list, state.groups.values()):
         share = coefficients[chosen].sum(axis=0)
         equal = coefficients.dtype.type(1 / len(chosen))

@@ -152,8 +152,10 @@ def _blocks(length: int, block: int) -> Taps:
 
 
 def _gaussian(sigma: float) -> np.ndarray:
-    """Return weights float32 at distances 0, 1, 2, …: the Gaussian's integral over pixels, so that a hard edge becomes
-    the error function."""
+    """Return a blur's weights float32 at distances 0, 1, 2, … pixels.
+
+    They are the Gaussian's integral over each pixel, so a hard edge becomes the error function.
+    """
     reach = math.ceil(_REACH * sigma)
     ends = np.array([math.erf((i - 0.5) / (sigma * math.sqrt(2))) for i in range(reach + 2)])
     return (np.diff(ends) / (2 * ends[-1])).astype(np.float32)
@@ -177,7 +179,12 @@ Box = tuple[slice, slice]  # rows and columns
 
 
 def box_around(cover: np.ndarray, reach: int) -> Box | None:
-    """The rows and columns within reach, in pixels, of what a matte (h, w) covers; None: it covers nothing."""
+    """Return the rows and columns of the box around what a matte (h, w) covers, or None if it covers nothing.
+
+    Args:
+        cover: The matte.
+        reach: Pixels by which the box is larger on each side.
+    """
     places = [np.flatnonzero(cover.max(axis=axis) > 0) for axis in (1, 0)]
     if not places[0].size:
         return None

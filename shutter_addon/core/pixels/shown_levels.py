@@ -35,8 +35,10 @@ class Display:
 
 @lru_cache(2)
 def _noise(width: int, height: int, dither: float) -> np.ndarray:
-    """Return the hash iqint3 of pixels (Jarzynski and Olano, Hash Functions for GPU Rendering, 2020), with a triangular
-    distribution from −1 to 1."""
+    """Return noise for each pixel with a triangular distribution from −1 to 1.
+
+    It is the hash iqint3 of the pixel's place (Jarzynski and Olano, Hash Functions for GPU Rendering, 2020).
+    """
     if not dither:
         return np.zeros((height, width), np.float32)
     y, x = np.ogrid[:height, :width]

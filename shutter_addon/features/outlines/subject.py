@@ -163,8 +163,7 @@ def _sure(share: np.ndarray, on: np.ndarray, box: Box) -> float:
 
 
 def _confidence(share: np.ndarray, sure: float, agrees: float = 1.0) -> float:
-    """Return how far a subject can be trusted: less where the network is unsure of it, or motion led elsewhere, or it
-    is small."""
+    """Return how sure a subject is, 0 to 1: less if the network is unsure, motion disagrees, or it is small."""
     size = np.count_nonzero(share > INSIDE) / SMALL
     return float(_from(sure, UNSURE) * _from(agrees, UNLIKE) * min(size, 1.0) ** 0.5)
 

@@ -1,10 +1,10 @@
-"""The moments between the frames of footage, found by optical flow as they are read: smooth exposures of any footage.
+"""Smooth exposures: a source with moments between its frames, found by optical flow.
 
-Whatever a pair of frames needs is found when its first moment is read, which the thread that decodes ahead does
-(prefetch). No moment is kept on disk, but vectors may be (derived.StoredVectors).
+The flow of a pair of frames is found when its first moment is read, on the thread that decodes ahead (media/prefetch).
+Moments are never kept on disk, but vectors may be (derived.StoredVectors).
 
-It also measures how far footage moves from frame to frame, which tells whether an exposure over several frames streaks
-or shows copies side by side.
+This module also measures how far footage moves from frame to frame. That tells whether an exposure over several frames
+streaks or shows copies side by side.
 """
 
 from __future__ import annotations
@@ -28,8 +28,9 @@ from ...media.files import check_index
 
 SMOOTH = 1, 2, 4, 8, 16  # moments from a filmed frame to the next
 MOST = 4  # equal frames in a row; more are a still shot
-# Levels of 255 by which a patch changes most: repeats by 0 to 2.8 after H.264 of CRF 18 to 28, with grain as without;
-# what moves on either side by at least as much, and TIMES as much as the repeats.
+# A frame repeats the one before if no patch changes by more than REPEATED levels of 255: after H.264 of CRF 18 to 28,
+# repeats change by 0 to 2.8, with grain or without. The frames on both sides must change by more than that, and by more
+# than TIMES as much as the repeats.
 REPEATED, TIMES = 3.0, 3.0
 
 _ROWS, _PATCH = 68, 3  # of the pictures that are compared; across and down, as grain goes in a mean
@@ -48,10 +49,11 @@ _FRAMES = MOST + 2  # frames that are kept: those that say what repeats
 
 
 class Repeats:
-    """Which frames of a source repeat the one before.
+    """Finds frames of a source that repeat the one before.
 
-    What it says of a frame depends on MOST + 1 frames on each side alone. Of the source, which keeps what it has read
-    last, it reads the neighbours, and more where something seems to repeat."""
+    The answer for a frame depends only on MOST + 1 frames on each side. The source must keep the frames that it read
+    last. Usually only the neighbours are read, and more frames where something seems to repeat.
+    """
 
     def __init__(self, source: FrameSource) -> None:
         self._source = source
@@ -59,8 +61,11 @@ class Repeats:
         self._changes: RecentValues[int, float] = RecentValues()
 
     def gap(self, index: int) -> tuple[int, int]:
-        """The two frames between which the moments behind a frame lie: itself and the next one; where frames repeat
-        around it, the first of these and the next that is another, of the same shot."""
+        """Return the two frames between which the moments after a frame lie.
+
+        Those are the frame and the next one. Where frames repeat, they are the first of the equal frames and the next
+        different frame of the same shot.
+        """
         first, stop = index, index + 1
         while stop - first <= MOST and self._change(first) <= REPEATED:
             first -= 1
@@ -73,8 +78,11 @@ class Repeats:
         return (first, stop) if is_repeated else (index, index + 1)
 
     def _change(self, index: int) -> float:
-        """By how many levels a frame differs from the one before; infinitely where that is none, or of another shot;
-        "not a number" where that cannot be told."""
+        """Return by how many levels a frame differs from the one before.
+
+        Returns:
+            Infinity if there is no frame before, or it belongs to another shot. NaN if a frame cannot be read.
+        """
         if index in (0, self._source.count):
             return math.inf
         try:
@@ -89,7 +97,7 @@ class Repeats:
         return float(np.abs(opencv.cv2.blur(after - before, (_PATCH, _PATCH))).max())
 
     def _picture(self, index: int) -> np.ndarray:
-        """A frame in grey (h, w) float32, small."""
+        """Return a frame in grey and reduced, (h, w) float32."""
         source = self._source
         return self._pictures.ask(
             index, lambda: flow.of_rows(source.read(index), source, _ROWS).astype(np.float32), _PICTURES
@@ -97,17 +105,27 @@ class Repeats:
 
 
 class SmoothSource(SourceWrapper):
-    """A source with the moments between its frames, `step` from a frame to the next.
+    """A source with the moments between another source's frames.
 
-    Moment i · step is the source's frame i. Where two frames have nothing in common, as at a cut, those between them
-    are the nearer one.
+    Moment i · step is the other source's frame i. Where two frames have nothing in common, as at a cut, a moment
+    between them is the nearer frame.
 
-    skip_repeats: frames that repeat the one before count as moments between the others, evenly spaced; `repeats` says
-    whether there were any so far"""
+    Attributes:
+        step: The number of moments from a frame to the next.
+        repeats: Whether repeated frames were replaced so far.
+    """
 
     def __init__(
         self, source: FrameSource, step: int, vectors: StoredVectors | None = None, *, skip_repeats: bool = False
     ) -> None:
+        """Add moments to a source.
+
+        Args:
+            source: The source. `close` closes it.
+            step: The number of moments from a frame to the next.
+            vectors: Gives vectors. None: find them each time.
+            skip_repeats: Replace frames that repeat the one before by moments, evenly spaced between the others.
+        """
         self._recent = lru_cache(_FRAMES)(source.read)
         super().__init__(SourceWrapper(source, self._recent))
         opencv.check("moments between frames need")
@@ -121,11 +139,11 @@ class SmoothSource(SourceWrapper):
         self.repeats = False
 
     def read(self, index: int) -> np.ndarray:
-        """The frame or the moment (height, width, 4). MediaError: as the source's `read`."""
+        """Return a frame or a moment (height, width, 4). It raises what the source's `read` raises."""
         return as_rgba(self.decoded(index))
 
     def decoded(self, index: int) -> Decoded:
-        """The frame, or the moment with the two frames around it. MediaError: as the source's `read`."""
+        """Return a frame, or a Moment with the two frames around it. It raises what the source's `read` raises."""
         check_index(self, index)
         filmed, number = divmod(index, self.step)
         first, last = self._repeats.gap(filmed) if self._repeats else (filmed, filmed + 1)
@@ -137,7 +155,7 @@ class SmoothSource(SourceWrapper):
         return self._moment((filmed, filmed + 1), number) if number else self._source.read(filmed)
 
     def _moment(self, pair: tuple[int, int], number: int) -> Decoded:
-        """What is so many moments after the first of two frames."""
+        """Return the moment with this number between two frames; the nearer frame if they have nothing in common."""
         steps = (pair[1] - pair[0]) * self.step
 
         def between() -> flow.Between:
@@ -147,14 +165,14 @@ class SmoothSource(SourceWrapper):
         return self._pairs.ask(pair, between, 2).moment(pair, number, steps)
 
     def close(self) -> None:
-        """Closes the file, and lets go of all frames."""
+        """Close the source and forget all frames."""
         self._pairs.clear()
         self._recent.cache_clear()
         self._source.close()
 
 
 def steps_for(source: FrameSource, smooth: int | str, window: int, *, skip_repeats: bool = False) -> int:
-    """How many moments an effect has from a filmed frame to the next.
+    """Return how many moments an effect has from a filmed frame to the next.
 
     Args:
         smooth: as frame_state.Options.step; "auto": as many as the fastest motion of a few pairs of frames needs
@@ -174,7 +192,7 @@ def steps_for(source: FrameSource, smooth: int | str, window: int, *, skip_repea
 
 
 def _fastest(source: FrameSource, skip_repeats: bool) -> float:
-    """Pixels from a frame to the next, of what moves fastest in a few pairs of neighbouring frames."""
+    """Return the fastest motion in a few pairs of neighbouring frames, in pixels per frame."""
     filmed = SourceWrapper(source, lru_cache(_FRAMES)(source.read))
     repeats = Repeats(filmed) if skip_repeats else None
     pairs = sorted({(source.count - 2) * k // (_PAIRS - 1) for k in range(_PAIRS)})
@@ -191,15 +209,31 @@ def _fastest(source: FrameSource, skip_repeats: bool) -> float:
 
 
 class Moved(NamedTuple):
-    """Where places of a frame, (n,) complex, lie in the next one: x + iy in fractions of the height, y down."""
+    """Points of a frame and the same points in a later one, (n,) complex: x + iy in heights of the picture, y down.
+
+    Attributes:
+        before: The points in the first frame.
+        after: The points in the other frame.
+    """
 
     before: np.ndarray
     after: np.ndarray
 
 
 def moved(source: FrameSource, index: int, other: int | None = None) -> Moved | None:
-    """What moves from a frame to another, or else to the next one; None: that cannot be told, as across a cut. It reads
-    both. It takes OpenCV. MediaError: they cannot be read."""
+    """Find how points move from a frame to another. Needs OpenCV.
+
+    Args:
+        source: Both frames are read from it.
+        index: The first frame.
+        other: The other frame. None: the next one.
+
+    Returns:
+        None if too little of the motion is certain, as across a cut.
+
+    Raises:
+        MediaError: A frame cannot be read.
+    """
     first, second = (flow.of_rows(source.read(i), source, _MEASURED) for i in (index, other or index + 1))
     if min(first.shape) < flow.SMALLEST:
         return None
@@ -219,14 +253,19 @@ def moved(source: FrameSource, index: int, other: int | None = None) -> Moved | 
 
 
 def step(moved: Moved, before: Similarity, after: Similarity) -> float:
-    """How far, in heights of the picture, what moves most goes in an exposure that follows something: _SHARE of the
-    picture goes as far or farther.
+    """Return how far the fastest part of a picture moves between two frames, relative to what the exposure follows.
 
-    before, after: where the points of the shown picture lie in the two frames, in heights of the picture"""
+    That is the distance, in heights of the picture, that _SHARE of the points move at least.
+
+    Args:
+        moved: The motion from one frame to the other.
+        before: Takes points of the shown picture to their places in the first frame, in heights of the picture.
+        after: Likewise, to their places in the other frame.
+    """
     ways = after.inverse()(moved.after) - before.inverse()(moved.before)
     return float(np.quantile(np.abs(ways), 1 - _SHARE))
 
 
 def smooth_step(height: int) -> float:
-    """Up to how many pixels from frame to frame a streak looks smooth, in a picture of that height."""
+    """Return the most pixels of motion per frame at which a streak looks smooth, in a picture of this height."""
     return max(_SMOOTH * height, _SMOOTH_PIXELS)

@@ -35,9 +35,13 @@ _NONE = np.zeros(0, complex)
 
 
 class FoundMotion(NamedTuple):
-    """A motion from the first picture to another one, with its confidence 0 … 1.
+    """A motion from the first picture to another one.
 
-    held: (n,) complex, the corners in the picture that agree with it"""
+    Attributes:
+        motion: The motion.
+        confidence: 0 to 1.
+        held: The corners in the other picture that agree with it, (n,) complex.
+    """
 
     motion: Similarity
     confidence: float

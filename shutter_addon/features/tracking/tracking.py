@@ -44,9 +44,10 @@ class TrackingError(MediaError, ValueError):
 
 @dataclass(frozen=True)
 class Tracked:
-    """A region's placement at a frame, with its confidence 0 … 1.
+    """A region's placement at a frame, with its confidence, 0 to 1.
 
-    With a fault (a sentence), tracking ended before this frame, which gets no keyframe."""
+    If it has a fault (a sentence), tracking ended before this frame, and the frame gets no key.
+    """
 
     frame: int
     placement: Placement
