@@ -78,6 +78,11 @@ def refused(done, *words):
         assert word.lower() in lines[0].lower()  # the system says "No space left", we say "no space left"
 
 
+def noise(*shape, seed=0):
+    """Random bytes, mostly frames (n, H, W, C)."""
+    return np.random.default_rng(seed).integers(0, 256, shape, dtype=np.uint8)
+
+
 def flip_bit(path):
     """Changes one bit in the midst of a file."""
     content = bytearray(path.read_bytes())
@@ -96,6 +101,12 @@ def recipe(window, *shutters, regions=(), **options):
             entry["bars"] = [float(b) for b in bars]
         entries.append(entry)
     return {"version": 2, "window": window, "shutters": entries, "regions": list(regions), **options}
+
+
+LASSO = {"name": "Face", "shutter": "S1", "kind": "lasso", "strokes": [[[0.1, 0.1], [0.9, 0.1], [0.5, 0.9]]]}
+MOVED = LASSO | {"keys": [{"frame": 1}, {"frame": 9, "location": [0.2, 0.1], "ease": "bezier"}]}
+# Keyed bars, and a region that moves.
+KEYED = recipe(4, {1: [1, 0, 0, 0], 9: [0, 0, 0, 1]}, [1, 1, 1, 1], regions=[MOVED])
 
 
 def image_strip(edit, first, start=1, channel=1, name="images"):
@@ -155,6 +166,14 @@ def sequencer(bpy):
     area.type = "SEQUENCE_EDITOR"
     with bpy.context.temp_override(window=window, area=area):
         yield area
+
+
+def in_sequencer(bpy, *operators, **words):
+    """Calls operators of Blender's sequencer, one after the other, as its keys do."""
+    with sequencer(bpy) as area, bpy.context.temp_override(region=area.regions[-1]):
+        for operator in operators:
+            assert operator(**words) == {"FINISHED"}
+    bpy.context.view_layer.update()
 
 
 def call(bpy, name, *arguments, **settings):

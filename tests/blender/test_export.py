@@ -9,9 +9,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from made_recipes import is_same
-from support import source_time, state, write_frames
+from support import recipe, source_time, state, write_frames
 
-from shutter_addon.blender.data import fcurves, recipe_import
+from shutter_addon.blender.data import annotations, fcurves, recipe_import
 from shutter_addon.blender.editing import add_effect, shutter_edits
 from shutter_addon.blender.output.matte_export import recipe_for
 from shutter_addon.core.messages import EffectError
@@ -115,13 +115,18 @@ def camera_keys(draw):
     ]
 
 
+def matte_fields(names):
+    return st.fixed_dictionaries(
+        {"shutter": st.sampled_from(names), "name": text, "invert": st.booleans(), "layer": st.booleans()}
+        | {"blend": st.sampled_from(["over", "add"])}
+        | {name: numbers(0, 1) | value_keys(0, 1) for name in ("opacity", "width")}
+    )
+
+
 @st.composite
 def mattes(draw, names):
     """A matte, of the footage's own file, or a ramp."""
-    fields = {"shutter": draw(st.sampled_from(names)), "name": draw(text), "invert": draw(st.booleans())}
-    fields |= {"layer": draw(st.booleans())}
-    fields |= {"blend": draw(st.sampled_from(["over", "add"])), "keys": draw(st.just([]) | camera_keys())}
-    fields |= {"opacity": draw(numbers(0, 1) | value_keys(0, 1)), "width": draw(numbers(0, 1) | value_keys(0, 1))}
+    fields = draw(matte_fields(names)) | {"keys": draw(st.just([]) | camera_keys())}
     if draw(st.booleans()):
         ramp = draw(st.sampled_from(["linear", "radial", "angle", "luminance"]))
         return records.RampRecord(kind="ramp", ramp=ramp, **fields)
@@ -133,12 +138,9 @@ def mattes(draw, names):
 @st.composite
 def outlines(draw, names):
     """Drawn once or several times, on whole frames."""
-    region = draw(regions(names))
-    fields = {"between": draw(st.sampled_from(["carried", "straight"])), "invert": draw(st.booleans())}
-    fields |= {"opacity": draw(numbers(0, 1) | value_keys(0, 1)), "width": draw(numbers(0, 1) | value_keys(0, 1))}
-    fields |= {"blend": draw(st.sampled_from(["over", "add"])), "layer": region.layer, "keys": region.keys}
-    fields |= {"shutter": region.shutter, "name": region.name, "strokes": region.strokes}
-    return records.OutlineRecord(kind="outline", **fields)
+    region, between = draw(regions(names)), draw(st.sampled_from(["carried", "straight"]))
+    drawn = {"strokes": region.strokes, "keys": region.keys}
+    return records.OutlineRecord(kind="outline", between=between, **drawn, **draw(matte_fields(names)))
 
 
 extremes = st.sampled_from(["lightest", "darkest"])
@@ -216,36 +218,26 @@ def test_on_a_moved_turned_and_scaled_strip(effect_on, source, rotation, scale, 
     assert after == before
 
 
+BARS = [
+    {"frame": 3, "bars": [1, 0, 0.5, 0], "ease": "bezier"},
+    {"frame": 17, "bars": [0, 0.2, 0, 1]},
+    {"frame": 30, "bars": [0.3, 0, 0, 1]},
+]
+MOVES = [
+    {"frame": 2, "location": [0.1, 0]},
+    {"frame": 20, "location": [0.5, 0.3], "rotation": 90, "scale": 2, "ease": "bezier"},
+    {"frame": 33, "strokes": [[[0.3, 0.2], [0.9, 0.9], [0.8, 0.1]]], "scale": 0.5},
+]
 BASE = {
     "version": 2,
     "window": 4,
     "inbetween": 2,
     "edge_aware": [{"frame": 4, "value": 0.25, "ease": "bezier"}, {"frame": 24, "value": 1}],
     "time": [{"frame": 2, "value": 1}, {"frame": 20, "value": 9.5, "ease": "bezier"}, {"frame": 31, "value": 3}],
-    "shutters": [
-        {"name": "Plain", "bars": [1, 1, 1, 1]},
-        {
-            "name": "Keyed",
-            "keys": [
-                {"frame": 3, "bars": [1, 0, 0.5, 0], "ease": "bezier"},
-                {"frame": 17, "bars": [0, 0.2, 0, 1]},
-                {"frame": 30, "bars": [0.3, 0, 0, 1]},
-            ],
-        },
-    ],
-    "regions": [
-        {
-            "shutter": "Keyed",
-            "name": "Face",
-            "strokes": [[[0.1, 0.5], [0.4, 0.6]]],
-            "keys": [
-                {"frame": 2, "location": [0.1, 0]},
-                {"frame": 20, "location": [0.5, 0.3], "rotation": 90, "scale": 2, "ease": "bezier"},
-                {"frame": 33, "strokes": [[[0.3, 0.2], [0.9, 0.9], [0.8, 0.1]]], "scale": 0.5},
-            ],
-        }
-    ],
+    "shutters": [{"name": "Plain", "bars": [1, 1, 1, 1]}, {"name": "Keyed", "keys": BARS}],
+    "regions": [{"shutter": "Keyed", "name": "Face", "strokes": [[[0.1, 0.5], [0.4, 0.6]]], "keys": MOVES}],
 }
+PLAIN = recipe(1, [1])
 
 
 def curve(edit, name, index=0):
@@ -314,37 +306,39 @@ def placed_without_keys(edit, effect):
 
 def drawn_apart_from_keys(edit, effect):
     """Drawings before the first key, between keys, and after the last."""
-    layer = effect.scene.annotation.layers[0]
     for number, x in ((25, 3), (43, 9), (68, -4)):
-        drawing = layer.frames.new(number)
-        stroke = drawing.strokes.new()
-        stroke.points.add(2)
-        stroke.points.foreach_set("co", [x, 1, 0, -x, 5, 0])
+        drawing = effect.scene.annotation.layers[0].frames.new(number)
+        annotations.add_stroke(drawing, np.array([(x, 1), (-x, 5)]))
 
 
 def two_of_a_name(edit, effect):
     effect.shutters[0].name = "Keyed"
 
 
+def stretched(edit, effect):
+    """Keys lie at thirds of frames, which float32 has others of than Python."""
+    keys = (100, 0.2, "linear"), (200, 0.8, "linear")
+    fcurves.set_keys(edit, f"{effect.path_from_id()}.edge_aware", 0, keys)
+    effect.regions.clear()
+    edit.render.frame_map_old, edit.render.frame_map_new = 300, 100
+
+
 CASES = [
     blenders_own_handles, free_handles, keyed_by_blender_in_part, elastic, modifiers, extrapolated, muted, sampled,
-    placed_without_keys, drawn_apart_from_keys, two_of_a_name,
+    placed_without_keys, drawn_apart_from_keys, two_of_a_name, stretched,
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize("change", CASES, ids=lambda change: change.__name__)
 def test_what_blender_made_agrees_at_every_frame(effect_on, change):
     """Within the tolerance that export states, and again after importing it."""
-
     apply(effect_on, BASE)
     change(effect_on[0], effect_on[1])
     found = export(effect_on)
-    plain = found
-    wanted = {frame: state(*effect_on, frame) for frame in range(FIRST, LAST + 1)}
-    for frame, instant in wanted.items():
-        check(plain.for_picture(ASPECT).at(frame - FIRST + 1), instant)
+    for frame in range(FIRST, LAST + 1):
+        check(found.for_picture(ASPECT).at(frame - FIRST + 1), state(*effect_on, frame))
         time, _ = source_time(effect_on[0], effect_on[1], frame)
-        assert plain.time.at(frame - FIRST + 1)[0] == pytest.approx(time, abs=1e-3)
+        assert found.time.at(frame - FIRST + 1)[0] == pytest.approx(time, abs=1e-3)
     apply(effect_on, found)
     assert is_same(export(effect_on), found)
 
@@ -360,18 +354,24 @@ def check(instant, wanted):
             assert points == pytest.approx(others, abs=3e-4)
 
 
-def test_keys_of_stretched_time_lie_between_frames(effect_on):
-    """At thirds, which float32 has others of than Python."""
-    edit, effect, _ = effect_on
-    shutter_edits.add_shutter(effect)
-    for frame, value in ((100, 0.2), (200, 0.8)):
-        effect.edge_aware = value
-        edit.keyframe_insert(f"{effect.path_from_id()}.edge_aware", frame=frame)
-    edit.render.frame_map_old, edit.render.frame_map_new = 300, 100
-    plain = export(effect_on).for_picture(ASPECT)
-    for frame in range(FIRST, LAST + 1):
-        wanted = state(*effect_on, frame).options.edge_aware
-        assert plain.at(frame - FIRST + 1).options.edge_aware == pytest.approx(wanted, abs=1e-4)
+def test_what_is_imported_is_shown(effect_on):
+    """With every ease and every kind of key; and another recipe leaves nothing of it."""
+    moves = [
+        {"frame": 2, "ease": "bezier", "location": [0.1, -0.2]},
+        {"frame": 6, "ease": "constant", "rotation": 50, "scale": 0.5},
+        {"frame": 9, "ease": "bezier", "strokes": [[[0.3, 0.9], [0.2, 0.2], [0.9, 0.5]]]},
+        {"frame": 15, "strokes": [[[0, 1], [1, 0]], [[0.5, 0.2]]], "location": [0.3, 0.3], "scale": 2},
+    ]
+    lasso = {"shutter": "Plain", "kind": "lasso", "strokes": [[[0.1, 0.2], [0.9, 0.3], [0.4, 0.8]]], "keys": moves}
+    held = {"name": "Held", "keys": [key | {"ease": "constant"} for key in BARS]}
+    data = BASE | {"shutters": [*BASE["shutters"], held], "regions": [*BASE["regions"], lasso], "exposure": "weighted"}
+    for said in (data, PLAIN):
+        apply(effect_on, said)
+        wanted = recipe_file.parse(json.dumps(said)).for_picture(ASPECT)
+        for frame in np.arange(0, 24, 0.5):
+            check(state(*effect_on, frame + FIRST - 1), wanted.at(frame))
+    assert not fcurves.curves_under(effect_on[0], "")
+    assert not list(effect_on[1].scene.annotation.layers)
 
 
 @pytest.mark.parametrize("ease", ["linear", "bezier"])
@@ -379,14 +379,8 @@ def test_a_source_time_that_stands_still_keeps_its_direction(effect_on, ease):
     """At the last key of a ramp, and in a freeze behind it; a jump has none."""
     edit, effect, _ = effect_on
     shutter_edits.add_shutter(effect)
-    keys = [
-        (1, 10, ease),
-        (11, 20, ease),
-        (21, 20, ease),
-        (31, 5, "constant"),
-        (41, 5, "constant"),
-        (51, 15, "constant"),
-    ]
+    keys = [(1, 10, ease), (11, 20, ease), (21, 20, ease)]
+    keys += [(frame, value, "constant") for frame, value in ((31, 5), (41, 5), (51, 15))]
     effect.use_source_time = True
     fcurves.set_keys(edit, f"{effect.path_from_id()}.source_time", 0, keys)
     backward = {frame: source_time(edit, effect, frame)[1] for frame in (1, 6, 11, 16, 26, 31, 36, 41, 51, 90)}
@@ -396,15 +390,14 @@ def test_a_source_time_that_stands_still_keeps_its_direction(effect_on, ease):
 
 
 def test_a_source_time_without_keys_holds_a_frame(effect_on):
-    plain = {"version": 2, "window": 1, "shutters": [{"name": "A", "bars": [1]}]}
-    apply(effect_on, plain)
+    apply(effect_on, PLAIN)
     effect_on[1].use_source_time, effect_on[1].source_time = True, 3.5
     assert records.recipe_of(export(effect_on))["time"] == [{"frame": 1, "value": 3.5, "ease": "linear"}]
     effect_on[1].use_source_time = False
     assert export(effect_on).time is None
-    apply(effect_on, plain | {"time": [{"frame": 1, "value": 3.5}]})
+    apply(effect_on, PLAIN | {"time": [{"frame": 1, "value": 3.5}]})
     assert effect_on[1].use_source_time
-    apply(effect_on, plain)
+    apply(effect_on, PLAIN)
     assert not effect_on[1].use_source_time
 
 
