@@ -8,16 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support import recipe, sequencer, write_frames
+from support import KEYED, MOVED, image_strip, in_sequencer, noise, recipe, write_frames
 
 from shutter_addon.blender.data import annotations, data_format, fcurves, recipe_import, selection, strips
 from shutter_addon.blender.editing import add_effect, match_source, undelete
 from shutter_addon.core.model.scribbles import mapped
 from shutter_addon.core.recipes import recipe_file
-
-LINE = {"name": "Face", "shutter": "S1", "kind": "lasso", "strokes": [[[0.1, 0.1], [0.9, 0.1], [0.5, 0.9]]]}
-MOVED = LINE | {"keys": [{"frame": 1}, {"frame": 9, "location": [0.2, 0.1], "ease": "bezier"}]}
-KEYED = recipe(4, {1: [1, 0, 0, 0], 9: [0, 0, 0, 1]}, [1, 1, 1, 1], regions=[MOVED])
 
 SCRIPT = """
 import bpy
@@ -63,13 +59,10 @@ def clip(edit, tmp_path):
     edit.render.resolution_x = edit.render.resolution_y = 32
 
     def add(start=1, channel=1, size=(32, 32), scene=None):
-        frames = np.random.default_rng(start + channel).integers(0, 256, (20, *size, 3), dtype=np.uint8)
+        frames = noise(20, *size, 3, seed=start + channel)
+        (scene or edit).sequence_editor_create()
         first = write_frames(tmp_path / f"in {start} {channel} {size[0]}", frames)
-        editor = (scene or edit).sequence_editor_create()
-        source = editor.strips.new_image(f"clip {start}", str(first), channel, start)
-        for file in sorted(first.parent.iterdir())[1:]:
-            source.elements.append(file.name)
-        return source
+        return image_strip(scene or edit, first, start, channel, f"clip {start}")
 
     return add
 
@@ -100,17 +93,17 @@ def shown(edit):
     return sorted(strips.effect_strips(edit), key=lambda strip: strip.left_handle)
 
 
-def in_sequencer(bpy, operator, **words):
-    with sequencer(bpy) as area, bpy.context.temp_override(region=area.regions[-1]):
-        assert operator(**words) == {"FINISHED"}
-    bpy.context.view_layer.update()
-
-
 def cut(edit, frame, kind="SOFT", only=None):
     """All strips at a frame, or those of a type alone."""
     for each in list(edit.sequence_editor.strips):
         if strips.is_at(each, frame - 1) and strips.is_at(each, frame) and only in (None, each.type):
             each.split(frame, kind, ignore_connections=True)
+
+
+def unlike(edit, render, before):
+    """Frames that are not as they were before."""
+    after = render(edit, list(before))
+    return [frame for frame in before if not np.array_equal(after[frame], before[frame])]
 
 
 @pytest.mark.parametrize("kind", ["SOFT", "HARD"])
@@ -122,8 +115,7 @@ def test_each_part_of_a_cut_strip_has_its_own_effect(bpy, edit, add, render, kin
         cut(edit, frame, kind, only)
         bpy.context.view_layer.update()
     if (kind, only) != ("HARD", "IMAGE"):  # which leaves the effect's source another content
-        after = render(edit, list(before))
-        assert all(np.array_equal(after[frame], before[frame]) for frame in before)
+        assert unlike(edit, render, before) == []
     parts, own = shown(edit), edit.virtual_shutter.effects
     assert parts[0] == strip  # and has the effect that was there
     assert effect_of(strip) == own[0]
@@ -133,10 +125,10 @@ def test_each_part_of_a_cut_strip_has_its_own_effect(bpy, edit, add, render, kin
     if effects > 1:
         last = effect_of(parts[-1])
         last.window, last.shutters[0].name = 24, "Other"
-        last.scene.annotation.layers[0].frames[0].strokes.remove(last.scene.annotation.layers[0].frames[0].strokes[0])
+        drawing = last.scene.annotation.layers[0].frames[0]
+        drawing.strokes.remove(drawing.strokes[0])
         assert [(effect.window, effect.shutters[0].name) for effect in own] == [(4, "S0")] * 2 + [(24, "Other")]
-        after = render(edit, [1, 7, 8, 14])
-        assert all(np.array_equal(after[frame], before[frame]) for frame in after)
+        assert unlike(edit, render, {frame: before[frame] for frame in (1, 7, 8, 14)}) == []
 
 
 def test_parts_in_a_meta_strip_and_its_copies(bpy, edit, add):
@@ -170,8 +162,7 @@ def test_a_cut_is_undone_and_done_again(bpy, edit, add, render):
         edit = bpy.context.scene
         assert len({part.scene for part in shown(edit)}) == len(edit.virtual_shutter.effects) == count
         assert (len(bpy.data.scenes), len(bpy.data.annotations)) == (count + 1, count)
-        after = render(edit, [5, 15])
-        assert all(np.array_equal(after[frame], before[frame]) for frame in before)
+        assert unlike(edit, render, before) == []
 
 
 def test_a_file_of_before_in_which_parts_share_gives_each_its_own(bpy, edit, add, render, tmp_path, monkeypatch):
@@ -185,8 +176,7 @@ def test_a_file_of_before_in_which_parts_share_gives_each_its_own(bpy, edit, add
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "before.blend"))
     edit = bpy.context.scene
     assert len({part.scene for part in shown(edit)}) == len(edit.virtual_shutter.effects) == 2
-    after = render(edit, [5, 15])
-    assert all(np.array_equal(after[frame], before[frame]) for frame in before)
+    assert unlike(edit, render, before) == []
 
 
 def test_a_duplicated_pair_shows_its_own_clip_wherever_that_is(bpy, edit, add):
@@ -228,7 +218,7 @@ def test_an_effect_is_pasted_onto_another_clip(bpy, edit, add, clip, where):
     strip.left_handle = 4
     bpy.context.view_layer.update()
     noted = effect_of(strip).regions[0].drawn.add()
-    ((drawing,),) = [list(layer.frames) for layer in effect_of(strip).scene.annotation.layers]
+    drawing = effect_of(strip).scene.annotation.layers[0].frames[0]
     noted.frame = drawing.frame_number - effect_of(strip).start
     undelete.forget_copy()
     with pytest.raises(RuntimeError, match="Copy an effect first"):
@@ -255,7 +245,7 @@ def test_an_effect_is_pasted_onto_another_clip(bpy, edit, add, clip, where):
     ((drawing,),) = [list(layer.frames) for layer in effect.scene.annotation.layers]
     assert drawing.frame_number == 98 == effect.start + effect.regions[0].drawn[0].frame
     to_picture = np.linalg.inv(annotations.picture_to_image(pasted, annotations.picture_size(effect)))
-    assert np.abs(mapped(to_picture, annotations.strokes_of(drawing)[0]) - LINE["strokes"][0]).max() < 1e-5
+    assert np.abs(mapped(to_picture, annotations.strokes_of(drawing)[0]) - MOVED["strokes"][0]).max() < 1e-5
     name = scene.name
     bpy.ops.ed.undo()
     bpy.context.view_layer.update()

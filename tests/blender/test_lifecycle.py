@@ -2,15 +2,24 @@
 
 import numpy as np
 import pytest
-from support import effect_of, image_strip, picture_of, recipe, remembering, sequencer, state, write_frames
+from support import (
+    KEYED,
+    effect_of,
+    image_strip,
+    in_sequencer,
+    noise,
+    picture_of,
+    recipe,
+    remembering,
+    state,
+    write_frames,
+)
 
 from shutter_addon.blender import handlers
 from shutter_addon.blender.data import fcurves
 from shutter_addon.blender.editing import add_effect, undelete
 
-REGION = {"name": "Face", "shutter": "S1", "kind": "lasso", "strokes": [[[0.1, 0.1], [0.9, 0.1], [0.5, 0.9]]]}
-MOVED = REGION | {"keys": [{"frame": 1}, {"frame": 9, "location": [0.2, 0.1], "ease": "bezier"}]}
-KEYED = recipe(4, {1: [1, 0, 0, 0], 9: [0, 0, 0, 1]}, [1, 1, 1, 1], regions=[MOVED])
+LATER = recipe(4, {101: [0, 1, 0, 0], 111: [0, 0, 1, 0]})
 
 
 pytestmark = pytest.mark.usefixtures("no_exception")
@@ -18,7 +27,7 @@ pytestmark = pytest.mark.usefixtures("no_exception")
 
 @pytest.fixture
 def images(tmp_path):
-    frames = np.random.default_rng(0).integers(0, 256, (30, 32, 32, 4), dtype=np.uint8)
+    frames = noise(30, 32, 32, 4)
     frames[..., 3] |= 128
     return write_frames(tmp_path / "in", frames)
 
@@ -57,7 +66,7 @@ def scene_strips(edit):
 
 
 def test_a_deleted_strip_takes_its_effect_along(bpy, edit, add, render):
-    first, second = add(1), add(101, recipe(4, {101: [0, 1, 0, 0], 111: [0, 0, 1, 0]}))
+    first, second = add(1), add(101, LATER)
     third = add(201)
     shown = render(edit, [205])[205]
     paths = {path for path, _ in curves(edit)}
@@ -100,7 +109,7 @@ def test_a_source_that_was_muted_shows_again(bpy, edit, add):
 @pytest.mark.parametrize("late", [True, False])
 def test_undo_brings_an_effect_back_and_redo_removes_it_again(bpy, edit, add, render, late):
     """late: in a window, the handler comes after the undo push."""
-    add(1), add(101, recipe(4, {101: [0, 1, 0, 0], 111: [0, 0, 1, 0]}))
+    add(1), add(101, LATER)
     before = render(edit, [5, 105])
     known, everything = curves(edit), census(bpy)
     bpy.ops.ed.undo_push(message="add")
@@ -131,29 +140,25 @@ def test_pasted_strips_have_their_effect(bpy, edit, add, images, render, cut):
     """Blender's clipboard does not hold the scenes that strips show."""
     add()
     clip = bpy.data.movieclips.load(str(images))
-    effect = edit.virtual_shutter.effects[0]
-    effect.regions[0].follow_clip = clip
-    effect.regions[0].image, effect.regions[0].mask = bpy.data.images.new("matte", 4, 4), bpy.data.masks.new("mask")
-    effect.regions[0].strip = "deleted with it"
+    region = edit.virtual_shutter.effects[0].regions[0]
+    region.follow_clip, region.strip = clip, "deleted with it"
+    region.image, region.mask = bpy.data.images.new("matte", 4, 4), bpy.data.masks.new("mask")
     before = render(edit, [1, 5, 9, 20])
     assert not np.array_equal(before[1], before[20])
     for s in edit.sequence_editor.strips:
         s.select = True
-    with sequencer(bpy) as area, bpy.context.temp_override(region=area.regions[-1]):
-        bpy.ops.sequencer.copy()
-        if cut:
-            bpy.ops.sequencer.delete()
-            update(bpy)
-            assert not edit.virtual_shutter.effects
-        for start in (101, 201):
-            edit.frame_set(start)
-            bpy.ops.sequencer.paste()
-            update(bpy)
+    in_sequencer(bpy, bpy.ops.sequencer.copy)
+    if cut:
+        in_sequencer(bpy, bpy.ops.sequencer.delete)
+        assert not edit.virtual_shutter.effects
+    for start in (101, 201):
+        edit.frame_set(start)
+        in_sequencer(bpy, bpy.ops.sequencer.paste)
     shown = render(edit, [frame + 100 for frame in before] + [frame + 200 for frame in before])
     assert [effect.start for effect in edit.virtual_shutter.effects] == ([101, 201] if cut else [1, 101, 201])
-    assert all(effect.regions[0].follow_clip == clip for effect in edit.virtual_shutter.effects)
     for region, *_ in (effect.regions for effect in edit.virtual_shutter.effects):
         assert (region.image.name, region.mask.name, region.strip) == ("matte", "mask", "deleted with it")
+        assert region.follow_clip == clip
     for frame, picture in before.items():
         assert np.array_equal(shown[frame + 100], picture)
         assert np.array_equal(shown[frame + 200], picture)
@@ -174,12 +179,10 @@ def test_a_cut_strip_pasted_into_another_edit(bpy, edit, add, render):
     assert np.array_equal(render(edit, [5])[5], before)
     for s in edit.sequence_editor.strips:
         s.select = True
-    with sequencer(bpy) as area, bpy.context.temp_override(region=area.regions[-1]):
-        bpy.ops.sequencer.copy()
+    in_sequencer(bpy, bpy.ops.sequencer.copy)
     bpy.context.window.scene = other
     other.frame_set(1)
-    with sequencer(bpy) as area, bpy.context.temp_override(region=area.regions[-1]):
-        bpy.ops.sequencer.paste()
+    in_sequencer(bpy, bpy.ops.sequencer.paste)
     assert np.array_equal(render(other, [5])[5], before)
     assert other.virtual_shutter.effects[0].scene != edit.virtual_shutter.effects[0].scene
 
@@ -193,7 +196,6 @@ def test_a_region_follows_its_layer(bpy, edit, add):
     layer.info = "Renamed"
     update(bpy)
     assert effect.regions[0].layer == "Renamed"
-
     assert len(state(edit, effect, strip, 5).shapes[0].strokes) == 1
     strip.scene.annotation.layers.remove(layer)
     update(bpy)
@@ -226,8 +228,7 @@ def test_effect_and_source_are_connected_as_the_source_was(edit, add, images):
 @pytest.mark.parametrize("link", [True, False])
 def test_a_linked_or_appended_edit_renders_the_same(bpy, edit, add, render, tmp_path, link):
     path, edit.name = str(tmp_path / "library.blend"), "Film"
-    add()
-    add(101, recipe(4, {101: [0, 1, 0, 0], 111: [0, 0, 1, 0]}))
+    add(1), add(101, LATER)
     pictures = render(edit, [5, 105])
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
