@@ -40,11 +40,11 @@ def going(bpy):
         modal_handler_add=lambda _operator: None,
     )
     context = SimpleNamespace(window_manager=manager, window=object())
-    return Going(), context, timers, operator_bases
+    return Going(), context, timers
 
 
 def test_it_ends_with_its_last_step(going):
-    operator, context, timers, _bases = going
+    operator, context, timers = going
     assert operator.begin(context, waits=False) == {"RUNNING_MODAL"}
     assert [operator.modal(context, event) for event in (TICK, OTHER, TICK)] == [{"RUNNING_MODAL"}] * 3
     assert len(timers) == 1
@@ -53,7 +53,7 @@ def test_it_ends_with_its_last_step(going):
 
 
 def test_escape_or_a_closed_window_ends_it_before_the_next_step(going):
-    operator, context, timers, _bases = going
+    operator, context, timers = going
     operator.begin(context, waits=False)
     assert operator.modal(context, ESCAPE) == {"FINISHED"}
     assert (operator.ends, operator.left, timers) == ("stopped", 3, [])
@@ -64,7 +64,7 @@ def test_escape_or_a_closed_window_ends_it_before_the_next_step(going):
 
 
 def test_an_error_that_nobody_expects_lets_go_of_its_timer(going):
-    operator, context, timers, _bases = going
+    operator, context, timers = going
     operator.begin(context, waits=False)
     operator.left = None
     with pytest.raises(ZeroDivisionError):
@@ -73,10 +73,11 @@ def test_an_error_that_nobody_expects_lets_go_of_its_timer(going):
 
 
 def test_what_a_file_that_is_loaded_has_ended_ends_with_the_next_event(going, monkeypatch):
-    operator, context, timers, bases = going
+    operator, context, timers = going
     operator.begin(context, waits=False)
-    monkeypatch.setattr(bases, "bpy", SimpleNamespace(context=context, data=SimpleNamespace(workspaces=[])))
-    bases.end_all()
+    stands = SimpleNamespace(context=context, data=SimpleNamespace(workspaces=[]))
+    monkeypatch.setattr(operator_bases, "bpy", stands)
+    operator_bases.end_all()
     assert timers == []
     assert operator.modal(context, OTHER) == {"FINISHED"}
     assert (operator.ends, operator.left) == ("done", 3)

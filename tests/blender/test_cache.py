@@ -1,39 +1,27 @@
 """Every change that changes pictures reaches the sequencer's cache of finished frames; playing does not."""
 
-import shutil
-
 import numpy as np
 import pytest
-from support import effect_of, image_strip, recipe, request, write_frames
+from support import KEYED, effect_of, image_strip, noise, request, write_frames
 
 from shutter_addon.blender import handlers
 from shutter_addon.blender.data import fcurves, source_media, strips
 from shutter_addon.blender.rendering import invalidation, session
 from shutter_addon.media import sequence
 
-REGION = {"name": "Face", "shutter": "S1", "kind": "lasso", "strokes": [[[0.1, 0.1], [0.9, 0.1], [0.5, 0.9]]]}
-MOVED = REGION | {"keys": [{"frame": 1}, {"frame": 9, "location": [0.2, 0.1], "ease": "bezier"}]}
-KEYED = recipe(4, {1: [1, 0, 0, 0], 9: [0, 0, 1, 0]}, [1, 1, 1, 1], regions=[MOVED], border=True)
 FRAME = 5
 
 
-@pytest.fixture(scope="module")
-def noise(tmp_path_factory):
-    frames = np.random.default_rng(0).integers(0, 256, (30, 32, 32, 3), dtype=np.uint8)
-    return write_frames(tmp_path_factory.mktemp("noise"), frames)
-
-
 @pytest.fixture
-def images(noise, tmp_path):
-    return shutil.copytree(noise.parent, tmp_path / "in") / noise.name
+def images(tmp_path):
+    return write_frames(tmp_path / "in", noise(30, 32, 32, 3))
 
 
 @pytest.fixture
 def effect(bpy, edit, images):
     """An effect on an image strip, with keyed bars and a region that moves."""
     edit.render.resolution_x = edit.render.resolution_y = 32
-    source = image_strip(edit, images)
-    _strip, effect = effect_of(edit, source, KEYED)
+    _strip, effect = effect_of(edit, image_strip(edit, images), KEYED | {"border": True})
     bpy.context.view_layer.update()
     return effect
 
@@ -148,10 +136,7 @@ def test_the_cache_is_on(bpy, edit, effect, render):
 def test_a_file_replaced_in_the_middle_is_rendered(bpy, edit, effect, render, images):
     """In place, as Blender writes over its own renders: the folder tells nothing of it."""
     before = render(edit, [FRAME])[FRAME]
-    replaced = np.full((32, 32, 3), 200, dtype=np.uint8)
-    write_frames(images.parent, [replaced] * FRAME, "other")
-    path = images.parent / f"f{FRAME:04d}.png"
-    path.write_bytes((images.parent / f"other{FRAME:04d}.png").read_bytes())
+    (images.parent / f"f{FRAME:04d}.png").write_bytes((images.parent / "f0030.png").read_bytes())
     after = render(edit, [FRAME])[FRAME]
     assert not np.array_equal(after, before)
     edit.sequence_editor.use_cache_raw = edit.sequence_editor.use_cache_final = False
