@@ -31,32 +31,22 @@ def place(index, velocity):
     return velocity[0] * index / WIDTH, -velocity[1] * index / HEIGHT
 
 
-def region(keys):
-    """A stroke that lies still but for its keys, {timeline frame: location}."""
-    return {
-        "name": "car",
-        "shutter": "S0",
-        "strokes": [[[0.4, 0.4], [0.6, 0.6]]],
-        "keys": [{"frame": frame, "location": list(location)} for frame, location in keys.items()],
-    }
-
-
 def following(keys, follow="car", **options):
-    data = recipe(WINDOW, [1] * WINDOW, regions=[region(keys)], **options)
+    """The recipe of a stroke that lies still but for its keys, {timeline frame: location}, and of what follows."""
+    keys = [{"frame": frame, "location": list(location)} for frame, location in keys.items()]
+    car = {"name": "car", "shutter": "S0", "strokes": [[[0.4, 0.4], [0.6, 0.6]]], "keys": keys}
+    data = recipe(WINDOW, [1] * WINDOW, regions=[car], **options)
     data["shutters"][0]["follow"] = follow
     return data
 
 
 @pytest.fixture
 def shown(bpy, edit, tmp_path):
-    """Gives the picture of an effect at a timeline frame, and the recipe's, for footage of a velocity; change: what
-    happens to the source strip first."""
+    """Edit, effect, strip, and the request of a picture at a timeline frame, for footage of a velocity."""
 
-    def show(data, velocity, frame, change=lambda source: None, film=codes):
+    def show(data, velocity, frame, film=codes):
         first = write_frames(tmp_path / "in", [film(index, velocity) for index in range(COUNT)])
-        source = image_strip(edit, first)
-        change(source)
-        strip, effect = effect_of(edit, source, data)
+        strip, effect = effect_of(edit, image_strip(edit, first), data)
         return edit, effect, strip, request(edit, effect, strip, frame)
 
     yield show

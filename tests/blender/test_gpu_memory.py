@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support import picture_of, read_picture, recipe, write_frames
+from support import noise, picture_of, read_picture, recipe, write_frames
 
 from shutter_addon.blender.rendering import render_settings, sessions
 
@@ -14,11 +14,10 @@ ROOMY, SMALL = 64, 12
 @pytest.fixture(scope="module")
 def film(tmp_path_factory):
     """The first of ten frames, and a recipe whose scribble moves."""
-    frames = np.random.default_rng(0).integers(0, 256, (10, SIZE[1], SIZE[0], 3), dtype=np.uint8)
     keys = [{"frame": 1}, {"frame": 10, "location": [0.3, 0.1]}]
     moved = {"shutter": "S1", "strokes": [[[0.2, 0.2], [0.5, 0.8]]], "width": 0.1, "keys": keys}
     data = recipe(8, np.ones(8), [1] + [0] * 7, regions=[moved], border=True)
-    return write_frames(tmp_path_factory.mktemp("film"), frames), data
+    return write_frames(tmp_path_factory.mktemp("film"), noise(10, *SIZE[::-1], 3)), data
 
 
 def pictures(folder):
@@ -38,17 +37,16 @@ def test_little_memory_shows_the_same_and_says_so_once(command_here, film, tmp_p
     assert np.array_equal(part[0], small[2])
 
 
-@pytest.mark.parametrize(
-    ("megabytes", "sentence"),
-    [("1", "in the 1 MB that it may take"), *((each, "--gpu-memory: ") for each in ("-5", "1.5", "much"))],
-)
-def test_what_cannot_be_is_a_sentence(command_here, film, tmp_path, megabytes, sentence):
+def test_what_cannot_be_is_told(command_here, film, tmp_path):
     first, data = film
-    done = command_here(first, "--output", tmp_path / "none", "--gpu-memory", megabytes, recipe=data, check=False)
-    assert done.returncode == 2
-    assert ("has no room for" in done.stderr) == (megabytes == "1")
-    assert sentence in done.stderr
-    assert "Traceback" not in done.stderr
+    for megabytes, sentence in (
+        ("1", "in the 1 MB that it may take"),
+        *((each, f"--gpu-memory: '{each}' is not a number of megabytes") for each in ("-5", "1.5", "much")),
+    ):
+        options = "--output", tmp_path / "none", "--gpu-memory", megabytes
+        done = command_here(first, *options, recipe=data, check=False)
+        assert done.returncode == 2
+        assert sentence in done.stderr
 
 
 def test_a_session_gives_back_what_it_took_and_settles_for_another_limit(bpy, edit, effect):

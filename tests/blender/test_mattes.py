@@ -1,12 +1,13 @@
 """Mattes and ramps in Blender: files, strips of the edit, as they are trimmed and retimed, and what becomes of them."""
 
+import functools
 import json
 import shutil
 
 import av
 import numpy as np
 import pytest
-from support import effect_of, image_strip, read_picture, recipe, request, sequencer, write_frames
+from support import effect_of, image_strip, in_sequencer, read_picture, recipe, request, sequencer, write_frames
 
 from shutter_addon.blender import command
 from shutter_addon.blender.data import annotations, recipe_import, selection, source_media, strips
@@ -61,15 +62,16 @@ def shown(bpy, edit, footage):
         change(source)
         strip, effect = effect_of(edit, source, content)
 
-        def coefficients(frame):
-            asked = request(edit, effect, strip, frame)
-            levels = 255 * light.to_encoded(asked.picture()[..., 0].astype(float))
-            return (levels - (20 + 10 * asked.index)) / 10
-
-        return strip, effect, coefficients
+        return strip, effect, functools.partial(coefficients_of, edit, effect, strip)
 
     yield show
     sessions.forget()
+
+
+def coefficients_of(edit, effect, strip, frame):
+    asked = request(edit, effect, strip, frame)
+    levels = 255 * light.to_encoded(asked.picture()[..., 0].astype(float))
+    return (levels - (20 + 10 * asked.index)) / 10
 
 
 def strip_of(edit, path, frame=1, count=COUNT, name="matte"):
@@ -159,9 +161,7 @@ def test_a_file_is_moved_with_its_mattes(bpy, edit, shown, matte, footage, tmp_p
     def assert_shown():
         edit = bpy.data.scenes["Edit"]
         (effect,) = edit.virtual_shutter.effects
-        asked = request(edit, effect, strips.effect_strips(edit)[0], 3)
-        levels = 255 * light.to_encoded(asked.picture()[..., 0].astype(float))
-        assert close((levels - (20 + 10 * asked.index)) / 10, values(2) / 255)
+        assert close(coefficients_of(edit, effect, strips.effect_strips(edit)[0], 3), values(2) / 255)
 
     bpy.ops.wm.open_mainfile(filepath=moved)
     assert_shown()
@@ -258,10 +258,13 @@ def test_export_writes_strips_and_points_to_files(edit, shown, matte, tmp_path):
     own = strip_of(edit, matte, 3, 6)
     effect.regions[1].matte, effect.regions[1].strip_name = "STRIP", own.name
     (tmp_path / "out").mkdir()
-    recipe_file.save(
-        matte_export.recipe_for(edit, effect, strip, tmp_path / "out" / "r.json"), tmp_path / "out" / "r.json"
-    )
-    saved = recipe_file.load(tmp_path / "out" / "r.json")
+
+    def export(name):
+        path = tmp_path / "out" / name
+        recipe_file.save(matte_export.recipe_for(edit, effect, strip, path), path)
+        return recipe_file.load(path)
+
+    saved = export("r.json")
     said, before = (records.recipe_of(each)["regions"] for each in (saved, recipe_file.parse(json.dumps(content))))
     assert said[0] == before[0] | {"path": "../matte/m0001.png"}
     assert said[1]["path"] == "r mattes/2 strip_1/0001.png"
@@ -270,9 +273,7 @@ def test_export_writes_strips_and_points_to_files(edit, shown, matte, tmp_path):
     recipe_import.apply(edit, effect, strip, saved, tmp_path / "out")
     for frame, expected in zip((1, 4, 10), before, strict=True):
         assert close(coefficients(frame), expected)
-    again = tmp_path / "out" / "again.json"
-    recipe_file.save(matte_export.recipe_for(edit, effect, strip, again), again)
-    assert records.recipe_of(recipe_file.load(again)) == records.recipe_of(saved)
+    assert records.recipe_of(export("again.json")) == records.recipe_of(saved)
 
 
 def test_an_export_spares_what_it_reads(edit, shown, matte, tmp_path):
@@ -369,20 +370,14 @@ def test_cut_and_pasted_effects_have_their_mattes(bpy, edit, shown, matte, mask)
     for strip in edit.sequence_editor.strips:
         strip.select = True
     edit.frame_set(1)
-    with sequencer(bpy) as area, bpy.context.temp_override(region=area.regions[-1]):
-        bpy.ops.sequencer.copy()
-        bpy.ops.sequencer.delete()
-        bpy.context.view_layer.update()
-        assert not edit.virtual_shutter.effects
-        edit.sequence_editor.strips.new_effect("matte", "COLOR", 8, 1, length=5)
-        bpy.ops.sequencer.paste()
-        bpy.context.view_layer.update()
+    in_sequencer(bpy, bpy.ops.sequencer.copy, bpy.ops.sequencer.delete)
+    assert not edit.virtual_shutter.effects
+    edit.sequence_editor.strips.new_effect("matte", "COLOR", 8, 1, length=5)
+    in_sequencer(bpy, bpy.ops.sequencer.paste)
     (effect,) = edit.virtual_shutter.effects
     assert (effect.regions[0].image, effect.regions[2].mask) == (image, mask)
     assert effect.regions[1].strip_name == "matte.001"
-    asked = request(edit, effect, strips.effect_strips(edit)[0], 7)
-    levels = 255 * light.to_encoded(asked.picture()[..., 0].astype(float))
-    assert close((levels - (20 + 10 * asked.index)) / 10, before)
+    assert close(coefficients_of(edit, effect, strips.effect_strips(edit)[0], 7), before)
 
 
 def test_a_changed_mask_drops_finished_frames(bpy, edit, shown, matte, mask):
