@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import operator
 from pathlib import Path
 
 import numpy as np
@@ -38,37 +39,49 @@ points = st.tuples(*[st.integers(-1_000_000, 2_000_000).map(lambda n: n / 1e6)] 
 strokes = st.lists(st.lists(points, min_size=1, max_size=4), min_size=1, max_size=3)
 eases = st.sampled_from(["linear", "bezier", "constant"])
 text = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=12)
-frames = st.lists(st.integers(-20, 200).map(lambda n: n / 4), min_size=1, max_size=4, unique=True).map(sorted)
-whole_frames = st.lists(st.integers(-20, 60).map(float), min_size=1, max_size=4, unique=True).map(sorted)
+frames = st.integers(-20, 200).map(lambda n: n / 4)
+whole_frames = st.integers(-20, 60).map(float)
+places, scales = st.tuples(*[numbers(-100, 100)] * 2), numbers(-50, 50)
+turns = st.integers(-720_00, 720_00).map(lambda n: n / 100)
+frame_of = operator.attrgetter("frame")
 
 
-@st.composite
-def shutters(draw, name, window):
+def keys(kind, *values, at=frames):
+    listed = st.lists(st.builds(kind, at, *values), min_size=1, max_size=4, unique_by=frame_of)
+    return listed.map(lambda found: sorted(found, key=frame_of))
+
+
+def value_keys(low, high):
+    return keys(records.ValueKey, numbers(low, high), eases)
+
+
+camera_keys = keys(records.MoveKey, places, turns, scales, eases)
+
+
+def shutters(name, window):
     bars = st.lists(numbers(0, 1e6), min_size=window, max_size=window).filter(lambda bars: sum(bars) > 1e-5)
-    color = draw(st.tuples(*[numbers(0, 1)] * 3))
-    if draw(st.booleans()):
-        return records.ShutterRecord(name=name, color=color, bars=draw(bars))
-    keys = [records.BarsKey(frame, draw(bars), draw(eases)) for frame in draw(frames)]
-    return records.ShutterRecord(name=name, color=color, keys=keys)
+    shown = {"bars": bars}, {"keys": keys(records.BarsKey, bars, eases)}
+    named = {"name": st.just(name), "color": st.tuples(*[numbers(0, 1)] * 3)}
+    return st.one_of(*(st.builds(records.ShutterRecord, **named, **fields) for fields in shown))
 
 
-@st.composite
-def regions(draw, names):
-    redrawn = draw(st.booleans())
-    keys = []
-    for i, frame in enumerate(draw(whole_frames if redrawn else frames) if draw(st.booleans()) else []):
-        location = draw(st.tuples(*[numbers(-100, 100)] * 2))
-        rotation = draw(st.integers(-720_00, 720_00)) / 100
-        drawn = draw(strokes) if redrawn and i and draw(st.booleans()) else None
-        keys.append(records.RegionKey(frame, location, rotation, draw(numbers(-50, 50)), draw(eases), drawn))
-    kind, width = draw(st.sampled_from(["line", "lasso"])), draw(numbers(0, 10))
-    named = {"shutter": draw(st.sampled_from(names)), "name": draw(text), "layer": draw(st.booleans())}
-    return records.RegionRecord(kind=kind, width=width, strokes=draw(strokes), keys=keys, **named)
+def first_undrawn(found):
+    return [dataclasses.replace(found[0], strokes=None), *found[1:]]
 
 
-@st.composite
-def value_keys(draw, low, high):
-    return [records.ValueKey(frame, draw(numbers(low, high)), draw(eases)) for frame in draw(frames)]
+def regions(names):
+    moves = places, turns, scales, eases
+    redrawn = keys(records.RegionKey, *moves, st.none() | strokes, at=whole_frames).map(first_undrawn)
+    return st.builds(
+        records.RegionRecord,
+        kind=st.sampled_from(["line", "lasso"]),
+        width=numbers(0, 10),
+        strokes=strokes,
+        keys=st.just([]) | keys(records.RegionKey, *moves) | redrawn,
+        shutter=st.sampled_from(names),
+        name=text,
+        layer=st.booleans(),
+    )
 
 
 def of_field(field):
@@ -101,46 +114,37 @@ def valid_recipes(draw, longest=6):
         shutters=[draw(shutters(name, window)) for name in names],
         regions=draw(st.lists(regions(names), max_size=3)),
         time=draw(st.just([]) | value_keys(-10, 10000)),
-        camera=draw(st.just([]) | camera_keys()),
+        camera=draw(st.just([]) | camera_keys),
         **draw(options),
     )
 
 
-@st.composite
-def camera_keys(draw):
-    places = {frame: draw(st.tuples(*[numbers(-100, 100)] * 2)) for frame in draw(frames)}
-    return [
-        records.MoveKey(frame, place, draw(st.integers(-720_00, 720_00)) / 100, draw(numbers(-50, 50)), draw(eases))
-        for frame, place in places.items()
-    ]
-
-
 def matte_fields(names):
-    return st.fixed_dictionaries(
-        {"shutter": st.sampled_from(names), "name": text, "invert": st.booleans(), "layer": st.booleans()}
-        | {"blend": st.sampled_from(["over", "add"])}
-        | {name: numbers(0, 1) | value_keys(0, 1) for name in ("opacity", "width")}
-    )
+    named = {"shutter": st.sampled_from(names), "name": text, "invert": st.booleans(), "layer": st.booleans()}
+    keyed = {name: numbers(0, 1) | value_keys(0, 1) for name in ("opacity", "width")}
+    return named | keyed | {"blend": st.sampled_from(["over", "add"])}
 
 
-@st.composite
-def mattes(draw, names):
-    """A matte, of the footage's own file, or a ramp."""
-    fields = draw(matte_fields(names)) | {"keys": draw(st.just([]) | camera_keys())}
-    if draw(st.booleans()):
-        ramp = draw(st.sampled_from(["linear", "radial", "angle", "luminance"]))
-        return records.RampRecord(kind="ramp", ramp=ramp, **fields)
-    fields |= {"offset": draw(st.integers(-9, 9)), "timing": draw(st.sampled_from(["source", "timeline"]))}
-    channel = draw(st.sampled_from(["luminance", "red", "green", "blue", "alpha"]))
-    return records.MatteRecord(kind="matte", path="in/f0001.png", channel=channel, **fields)
+def mattes(names):
+    """Mattes, of the footage's own file, and ramps."""
+    fields = matte_fields(names) | {"keys": st.just([]) | camera_keys}
+    ramp = st.sampled_from(["linear", "radial", "angle", "luminance"])
+    file = {
+        "path": st.just("in/f0001.png"),
+        "channel": st.sampled_from(["luminance", "red", "green", "blue", "alpha"]),
+        "offset": st.integers(-9, 9),
+        "timing": st.sampled_from(["source", "timeline"]),
+    }
+    ramps = st.builds(records.RampRecord, kind=st.just("ramp"), ramp=ramp, **fields)
+    return ramps | st.builds(records.MatteRecord, kind=st.just("matte"), **file, **fields)
 
 
 @st.composite
 def outlines(draw, names):
     """Drawn once or several times, on whole frames."""
     region, between = draw(regions(names)), draw(st.sampled_from(["carried", "straight"]))
-    drawn = {"strokes": region.strokes, "keys": region.keys}
-    return records.OutlineRecord(kind="outline", between=between, **drawn, **draw(matte_fields(names)))
+    fields = draw(st.fixed_dictionaries(matte_fields(names))) | {"strokes": region.strokes, "keys": region.keys}
+    return records.OutlineRecord(kind="outline", between=between, **fields)
 
 
 extremes = st.sampled_from(["lightest", "darkest"])
