@@ -78,21 +78,12 @@ def test_a_movie_cut_off_in_the_middle(command_here, tmp_path):
 
 
 def test_no_recipe(command_here, frames, tmp_path):
-    """The sentence about a field is that of core; here, it is the only one, with the file's name."""
-    (tmp_path / "r.json").write_text("{")
-    (tmp_path / "field.json").write_text(json.dumps(STILL | {"\ud800\x1b": 1}))
-    os.mkfifo(tmp_path / "pipe")
-    for name, word in (
-        ("r.json", "r.json"),
-        ("none.json", "none.json"),
-        ("", tmp_path.name),
-        ("pipe", "pipe"),
-        ("field.json", "unknown field \\ud800\\x1b"),
-    ):
-        path = tmp_path / name
-        done = command_here(frames, "--recipe", path, "--output", tmp_path / "out", check=False)
-        refused(done, path.name, word)
-        assert not (tmp_path / "out").exists()
+    """The sentence is that of core; here, it is the only one, with the file's name."""
+    path = tmp_path / "field.json"
+    path.write_text(json.dumps(STILL | {"\ud800\x1b": 1}))
+    done = command_here(frames, "--recipe", path, "--output", tmp_path / "out", check=False)
+    refused(done, "field.json", "unknown field \\ud800\\x1b")
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(("width", "height"), [(33, 17), (4, 129)])
@@ -158,11 +149,11 @@ def test_stopped_halfway(render_words, tmp_path, number, output):
     to_and_fro = [{"frame": 1 + 5 * turn, "value": 6 if turn % 2 else 1} for turn in range(200)]
     arguments = render_words([first, "--output", tmp_path / output], recipe(4, [1] * 4, time=to_and_fro))
     with subprocess.Popen([sys.executable, "-m", "shutter_addon", *arguments], cwd=ROOT, stderr=-1) as process:
-        part = wait_for(lambda: next(tmp_path.rglob(".part-*"), None), process)
+        wait_for(lambda: len(list(tmp_path.rglob(".part-*"))), process)
         if output == "out":
-            wait_for(lambda: len(list(part.parent.glob("*.png"))) >= 3, process)
+            wait_for(lambda: len(list((tmp_path / "out").glob("*.png"))) >= 3, process)
         else:
-            wait_for(lambda: any(p.stat().st_size > 1000 for p in part.iterdir()), process)
+            wait_for(lambda: any(p.stat().st_size > 1000 for p in tmp_path.glob(".part-*/*")), process)
         os.kill(process.pid, number)
         process.wait(timeout=60)
     assert process.returncode == 130
@@ -178,15 +169,10 @@ def test_stopped_halfway(render_words, tmp_path, number, output):
             assert read_picture(path).shape == (90, 160, 3)
 
 
-def wait_for(condition, process, seconds=60):
-    """The first true value of a condition; fails when the process ends before."""
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        if value := condition():
-            return value
+def wait_for(condition, process):
+    while not condition():
         assert process.poll() is None, process.stderr.read()
         time.sleep(0.02)
-    raise AssertionError("nothing happened")
 
 
 def test_no_gl(command, frames, tmp_path):

@@ -12,7 +12,6 @@ from shutter_addon.blender import command
 from shutter_addon.blender.data import selection, strips
 from shutter_addon.blender.editing import baked_strips, reconcile
 from shutter_addon.blender.output import baked_film, film_output
-from shutter_addon.blender.rendering import sessions
 from shutter_addon.core import revision
 from shutter_addon.core.frames import light
 from shutter_addon.media import film_parts
@@ -26,7 +25,7 @@ def gradients():
 
 
 @pytest.fixture
-def film(bpy, edit, tmp_path):
+def film(bpy, edit, on_numpy, tmp_path):
     """Makes a saved edit of noise, or of gradients, under an effect, its strip active: scene, effect, strip."""
 
     def make(channels=3, *, smooth=False):
@@ -37,8 +36,7 @@ def film(bpy, edit, tmp_path):
         bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "edit.blend"), relative_remap=False)
         return edit, effect, strip
 
-    yield make
-    sessions.forget()
+    return make
 
 
 def bake(bpy, kind="OPEN_EXR"):
@@ -92,7 +90,6 @@ def test_a_movie_is_off_by_little(bpy, film, tmp_path):
     assert off.mean() <= 1
 
 
-@pytest.mark.usefixtures("on_numpy")
 def test_unbake_brings_the_effect_back(bpy, film):
     """And leaves a copy of what was baked that was moved away."""
     scene, _effect, strip = film()
@@ -113,7 +110,6 @@ def states(scene, strip):
     return [baked_strips.is_stale(scene, strips.effect_of(scene, part.scene), part) for part in parts]
 
 
-@pytest.mark.usefixtures("on_numpy")
 def test_it_says_that_it_is_stale(bpy, film):
     scene, effect, strip = film()
     strip.right_handle = 6
@@ -129,7 +125,6 @@ def test_it_says_that_it_is_stale(bpy, film):
     assert states(scene, strip) == [True], "it is longer"
 
 
-@pytest.mark.usefixtures("on_numpy")
 @pytest.mark.parametrize("kind", ["SOFT", "HARD"])
 def test_both_are_cut_and_nothing_is_lost(bpy, film, tmp_path, kind):
     scene, effect, strip = film()
@@ -146,7 +141,6 @@ def test_both_are_cut_and_nothing_is_lost(bpy, film, tmp_path, kind):
     assert np.abs(rendered(bpy, scene, tmp_path / "after", (3, 6)) - before).max() < 1e-6
 
 
-@pytest.mark.usefixtures("on_numpy")
 @pytest.mark.parametrize("kind", ["exr", "movie"])
 def test_the_command_goes_on_where_it_was_broken_off(film, tmp_path, capfd, kind):
     film()
@@ -184,7 +178,6 @@ def test_what_cannot_be_baked_is_one_sentence(film, tmp_path, run):
         refused(run("bake", tmp_path / "edit.blend", *words), sentence)
 
 
-@pytest.mark.usefixtures("on_numpy")
 def test_a_copy_of_all_of_it_is_unbaked_alone(bpy, film):
     scene, _effect, strip = film()
     bake(bpy)
@@ -204,7 +197,6 @@ def test_a_copy_of_all_of_it_is_unbaked_alone(bpy, film):
     assert states(scene, copied) == [False]
 
 
-@pytest.mark.usefixtures("on_numpy")
 def test_the_baked_strip_looks_as_the_effect_strip(bpy, film, tmp_path):
     """Transform, crop, flip and opacity, keys included, and in a meta strip."""
     scene, _effect, strip = film(4)
@@ -230,7 +222,6 @@ def test_the_baked_strip_looks_as_the_effect_strip(bpy, film, tmp_path):
     assert (rendered(bpy, scene, tmp_path / "again", shown) == before).all()
 
 
-@pytest.mark.usefixtures("on_numpy")
 @pytest.mark.parametrize("change", ["location", "weight"])
 def test_keys_that_moved_along_are_no_change_and_others_are(bpy, film, change):
     """Between keys Blender gives other floats at other frames."""
@@ -250,7 +241,6 @@ def test_keys_that_moved_along_are_no_change_and_others_are(bpy, film, change):
     assert states(scene, strip) == [True]
 
 
-@pytest.mark.usefixtures("on_numpy")
 @pytest.mark.parametrize("is_deleted", [False, True])
 def test_what_lies_above_stays_above(bpy, film, tmp_path, is_deleted):
     """A title above the effect, with room above it alone; by a second bake as well, and where its strip is deleted."""
@@ -293,7 +283,6 @@ def test_an_edit_that_is_not_saved_is_not_baked(bpy, edit, tmp_path):
         bpy.ops.shutter.bake(file_format="OPEN_EXR")
 
 
-@pytest.mark.usefixtures("on_numpy")
 def test_a_transparent_source_stays_muted_below_what_was_baked_of_it(bpy, film, tmp_path):
     scene, _effect, strip = film(4)
     bake(bpy)
@@ -350,7 +339,6 @@ def test_a_bake_ends_with_the_blender_that_began_it(bpy, film):
         job.end()
 
 
-@pytest.mark.usefixtures("on_numpy")
 @pytest.mark.skipif(os.name != "posix", reason="links need no rights there alone")
 @pytest.mark.parametrize(("kind", "name"), [("OPEN_EXR", "0001.exr"), ("MOVIE", "0001.mp4")])
 def test_nothing_is_baked_or_removed_behind_a_link(bpy, film, tmp_path, kind, name):

@@ -18,7 +18,7 @@ def images(tmp_path):
 
 
 @pytest.fixture
-def effect(bpy, edit, images):
+def effect(bpy, edit, images, on_numpy):
     """An effect on an image strip, with keyed bars and a region that moves."""
     edit.render.resolution_x = edit.render.resolution_y = 32
     _strip, effect = effect_of(edit, image_strip(edit, images), KEYED | {"border": True})
@@ -90,7 +90,6 @@ CHANGES = {
 }
 
 
-@pytest.mark.usefixtures("on_numpy")
 @pytest.mark.parametrize("change", CHANGES)
 def test_a_change_is_rendered(bpy, edit, effect, render, change):
     """And equals what a render without any cache gives."""
@@ -104,7 +103,6 @@ def test_a_change_is_rendered(bpy, edit, effect, render, change):
     assert np.array_equal(render(edit, [FRAME])[FRAME], after)
 
 
-@pytest.mark.usefixtures("on_numpy")
 @pytest.mark.parametrize("change", ["change_value", "change_property", "draw_stroke", "erase_stroke"])
 def test_undo_and_redo_are_rendered(bpy, edit, effect, render, change):
     before = render(edit, [FRAME])[FRAME]
@@ -120,7 +118,6 @@ def test_undo_and_redo_are_rendered(bpy, edit, effect, render, change):
         assert np.array_equal(render(bpy.context.scene, [FRAME])[FRAME], after)
 
 
-@pytest.mark.usefixtures("on_numpy")
 def test_the_cache_is_on(bpy, edit, effect, render):
     """What the other tests rest on: without the handlers, a frame would be the old one."""
     before = render(edit, [FRAME])[FRAME]
@@ -214,7 +211,6 @@ def test_what_is_known_of_files_is_bounded(edit, asked):
     assert [asks(number) for number in (599, 400, 0)] == [ends, ends, all_files]
 
 
-@pytest.mark.usefixtures("on_numpy")
 def test_finished_frames_are_kept_while_nothing_changes(bpy, edit, effect, render, monkeypatch):
     """Frames are there even when no file can be read: playing and selecting drop none."""
     before = render(edit, [3, FRAME])

@@ -4,9 +4,9 @@ import cv2
 import exact_diffusion
 import numpy as np
 import pytest
-from support import effect_of, image_strip, picture_of, recipe, request, state, write_frames
+from support import effect_of, image_strip, picture_of, recipe, request, write_frames
 
-from shutter_addon.blender.rendering import invalidation, previews
+from shutter_addon.blender.rendering import previews
 from shutter_addon.compute.guide import Guides, guiding
 from shutter_addon.core.model import scribbles
 from shutter_addon.media import open_source
@@ -35,19 +35,6 @@ def add(edit, film):
         return edit, effect, strip
 
     return added
-
-
-def test_keys_are_blenders_and_change_what_is_shown(add):
-    edit, effect, strip = add()
-    for frame, value in ((2, 0.0), (6, 1.0)):
-        effect.edge_aware = value
-        assert effect.keyframe_insert("edge_aware", frame=frame)
-    strengths = [state(edit, effect, strip, frame).options.edge_aware for frame in (1, 2, 4, 6, 9)]
-    assert strengths == pytest.approx([0, 0, 0.5, 1, 1], abs=1e-6)
-    invalidation.invalidate_changed(edit)
-    assert not invalidation.invalidate_changed(edit)
-    effect.keyframe_insert("edge_aware", frame=4)
-    assert invalidation.invalidate_changed(edit)
 
 
 def test_reversed_and_retimed_strips_follow_the_shown_frame(add):

@@ -9,28 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support import EXTENSION, read_picture, recipe
+from support import EXTENSION, KEYED, read_picture
 
 ROOT = Path(__file__).parents[2]
 TRACES = Path(__file__).parent / "traces.py"
-LONG_AND_SHARP = recipe(
-    8,
-    np.ones(8),
-    {1: [1, 0, 0, 0, 0, 0, 0, 0], 9: [0, 0, 0, 0, 0, 0, 0, 1]},
-    regions=[
-        {"shutter": "S0", "strokes": [[[0.1, 0.1], [0.1, 0.9]]]},
-        {
-            "shutter": "S1",
-            "kind": "lasso",
-            "strokes": [[[0.4, 0.3], [0.6, 0.3], [0.5, 0.7]]],
-            "keys": [
-                {"frame": 1, "ease": "bezier"},
-                {"frame": 6, "location": [0.1, 0.05], "rotation": 30, "scale": 1.2},
-                {"frame": 9, "strokes": [[[0.5, 0.3], [0.8, 0.4], [0.7, 0.6], [0.5, 0.7]]]},
-            ],
-        },
-    ],
-)
 
 
 def test_a_real_blender_keeps_nothing_of_a_disabled_extension(blender):
@@ -55,7 +37,7 @@ def test_a_saved_edit_renders_the_same_in_a_real_blender(blender, command_here, 
     footage.parent.mkdir(parents=True)
     footage.write_bytes(bunny.read_bytes())
     save = tmp_path / "here" / "edit.blend"
-    command_here(footage, "--output", tmp_path / "wheel", "--save", save, "--frames", "6:9", recipe=LONG_AND_SHARP)
+    command_here(footage, "--output", tmp_path / "wheel", "--save", save, "--frames", "6:9", recipe=KEYED)
     (tmp_path / "here").rename(tmp_path / "there")
     done = blender(tmp_path / "there" / "edit.blend", "-o", f"{tmp_path}/real/", "-f", "6,9")
     assert done.returncode == 0, done.stderr
@@ -66,7 +48,7 @@ def test_a_saved_edit_renders_the_same_in_a_real_blender(blender, command_here, 
 
 def test_the_command_in_a_real_blender_gives_its_exit_code(blender, tmp_path):
     """What it renders there: test_devices.py compares it."""
-    (tmp_path / "r.json").write_text(json.dumps(LONG_AND_SHARP))
+    (tmp_path / "r.json").write_text(json.dumps(KEYED))
     options = ["--recipe", tmp_path / "r.json", "--output", tmp_path / "no"]
     refused = blender("-c", "shutter", "render", tmp_path / "none.mp4", *options)
     assert refused.returncode == 2
@@ -82,7 +64,7 @@ from importlib import import_module
 addon_utils.enable({EXTENSION!r}, default_set=True)
 sys.exit(import_module({EXTENSION!r} + ".shutter_addon.blender.command").main(sys.argv[1:]))
 """
-    (tmp_path / "recipe.json").write_text(json.dumps(LONG_AND_SHARP))
+    (tmp_path / "recipe.json").write_text(json.dumps(KEYED))
     options = ("--recipe", tmp_path / "recipe.json", "--output", tmp_path / "out", "--frames", 1)
     done = subprocess.run(
         [sys.executable, "-c", code, "render", *map(str, (bunny, *options))],

@@ -7,9 +7,8 @@ import shutil
 import av
 import numpy as np
 import pytest
-from support import effect_of, image_strip, in_sequencer, read_picture, recipe, request, sequencer, write_frames
+from support import effect_of, image_strip, in_sequencer, recipe, request, sequencer, write_frames
 
-from shutter_addon.blender import command
 from shutter_addon.blender.data import annotations, recipe_import, selection, source_media, strips
 from shutter_addon.blender.interface import region_gizmo
 from shutter_addon.blender.output import matte_export
@@ -333,31 +332,6 @@ def test_handles_of_a_ramp(bpy, edit, shown, monkeypatch):
         handle = region_gizmo.SHUTTER_GT_region
         pressed = handle.invoke(handle, bpy.context, None)
         assert pressed == {"CANCELLED"}, "a handle that was there a moment ago moves nothing"
-
-
-def test_weights_are_read_back(bpy, tmp_path, footage):
-    """What `--weights` writes gives the same picture as mattes, for each shutter but the default one."""
-    stroke = {"name": "s", "shutter": "S1", "strokes": [[[0.3, 0.2], [0.4, 0.9]]]}
-    content = recipe(4, [1, 0, 0, 0], [0, 0, 0, 1], [1, 1, 1, 1], border=True, regions=[stroke])
-    lasso = {"name": "l", "shutter": "S2", "kind": "lasso", "strokes": [[[0.6, 0.2], [0.9, 0.3], [0.7, 0.8]]]}
-    content["regions"].append(lasso)
-
-    def render(name, content, *more):
-        (tmp_path / f"{name}.json").write_text(json.dumps(content))
-        where = "--recipe", str(tmp_path / f"{name}.json"), "--output", str(tmp_path / name)
-        assert command.main(["render", str(footage), "--frames", "2:4", *where, *more]) == 0
-        sessions.forget()  # what the command leaves open is closed, as where its process ends
-
-    render("a", content, "--weights", str(tmp_path / "weights"))
-    mattes = [
-        {"shutter": name, "kind": "matte", "path": "weights/0002.exr", "offset": -1, "channel": name, "blend": "add"}
-        for name in ("S1", "S2")
-    ]
-    render("b", content | {"regions": mattes, "border": False})
-    for frame in range(2, 5):
-        first, second = (read_picture(tmp_path / folder / f"{frame:04d}.png") for folder in "ab")
-        assert np.abs(first - second).max() <= 1
-        assert np.ptp(first) > 15
 
 
 def test_cut_and_pasted_effects_have_their_mattes(bpy, edit, shown, matte, mask):
