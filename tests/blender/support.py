@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import os
 import subprocess
 import sys
 import wave
@@ -247,6 +248,18 @@ class Asked:
 
     def coefficients(self):
         return self.session.run(self.renderer.coefficients, self.request)
+
+
+def python(*arguments, **environment):
+    """A Python of its own, with more in its environment, that has ended."""
+    return subprocess.run(
+        [sys.executable, *map(str, arguments)],
+        cwd=Path(__file__).parents[2],
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
 
 
 def packages(folder, blenders_python):

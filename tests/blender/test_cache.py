@@ -1,5 +1,7 @@
 """Every change that changes pictures reaches the sequencer's cache of finished frames; playing does not."""
 
+from unittest.mock import Mock
+
 import numpy as np
 import pytest
 from support import KEYED, effect_of, image_strip, noise, request, write_frames
@@ -142,10 +144,9 @@ def test_a_file_replaced_in_the_middle_is_rendered(bpy, edit, effect, render, im
 
 @pytest.fixture
 def asked(monkeypatch):
-    """The files of which it was asked whether they are the same."""
-    asked, stamp = [], source_media.stamp
-    monkeypatch.setattr(source_media, "stamp", lambda path: asked.append(path) or stamp(path))
-    return asked
+    """Counts the files of which it was asked whether they are the same."""
+    monkeypatch.setattr(source_media, "stamp", Mock(wraps=source_media.stamp))
+    return source_media.stamp
 
 
 @pytest.fixture
@@ -171,10 +172,10 @@ def test_a_redraw_asks_the_ends_of_a_sequence_alone(edit, effect, asked):
     (strip,) = strips.effect_strips(edit)
     invalidation.invalidate_changed(edit)
     for frame in (FRAME, FRAME + 1):
-        asked.clear()
+        asked.reset_mock()
         invalidation.invalidate_changed(edit)
         request(edit, effect, strip, frame)
-        assert len(asked) == 4
+        assert asked.call_count == 4
 
 
 def test_a_film_asks_all_files_before_it_and_then_the_ends_alone(bpy, edit, render, long, asked, monkeypatch):
@@ -182,8 +183,8 @@ def test_a_film_asks_all_files_before_it_and_then_the_ends_alone(bpy, edit, rend
     begin, counts = session.RenderSession.begin_next, []
 
     def begin_next(*arguments):
-        counts.append(len(asked))
-        asked.clear()
+        counts.append(asked.call_count)
+        asked.reset_mock()
         begin(*arguments)
 
     monkeypatch.setattr(session.RenderSession, "begin_next", begin_next)
@@ -201,10 +202,10 @@ def test_what_is_known_of_files_is_bounded(edit, asked):
     source = edit.sequence_editor.strips["images"]
 
     def asks(number):
-        asked.clear()
+        asked.reset_mock()
         source.name = f"images {number}"
         source_media.media_key(source)
-        return len(asked)
+        return asked.call_count
 
     ends, all_files = 2, 2 + len(source.elements)
     assert {asks(number) for number in range(600)} == {all_files}

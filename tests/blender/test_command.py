@@ -74,13 +74,12 @@ def test_weights_have_a_channel_for_each_layer(command_here, film, tmp_path):
     assert (there["S0"] == 1).all()
 
 
-@pytest.mark.parametrize("layer", [False, True])
-def test_chunks_and_order_change_no_bit(command_here, film, tmp_path, layer):
+def test_chunks_and_order_change_no_bit(command_here, film, tmp_path):
     first, _ = film
-    moving = {"shutter": "S1", "strokes": [[[0.2, 0.2], [0.4, 0.6]]], "width": 0.1, "layer": layer}
+    moving = {"shutter": "S1", "strokes": [[[0.2, 0.2], [0.4, 0.6]]], "width": 0.1, "layer": True}
     moving["keys"] = [{"frame": 1}, {"frame": 12, "location": [0.4, 0.1], "rotation": 40}]
     still = {"shutter": "S0", "strokes": [[[0.9, 0.1], [0.9, 0.9]]]}
-    edges = {"edge_aware": 1.0, "border": True, "aggregate": 4} if layer else {}
+    edges = {"edge_aware": 1.0, "border": True, "aggregate": 4}
     data = recipe(6, *np.random.default_rng(2).random((2, 6)), regions=[still, moving], **edges)
     command_here(first, "--output", tmp_path / "whole", "--frames", "2:8", recipe=data)
     for chunk in ("6:8", "4"):

@@ -1,15 +1,13 @@
 """The extension as Blender runs it: linked into its user folder, in the wheel and in a real Blender."""
 
 import json
-import os
 import runpy
-import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from support import EXTENSION, KEYED, read_picture
+from support import EXTENSION, KEYED, python, read_picture
 
 ROOT = Path(__file__).parents[2]
 TRACES = Path(__file__).parent / "traces.py"
@@ -66,12 +64,6 @@ sys.exit(import_module({EXTENSION!r} + ".shutter_addon.blender.command").main(sy
 """
     (tmp_path / "recipe.json").write_text(json.dumps(KEYED))
     options = ("--recipe", tmp_path / "recipe.json", "--output", tmp_path / "out", "--frames", 1)
-    done = subprocess.run(
-        [sys.executable, "-c", code, "render", *map(str, (bunny, *options))],
-        env=os.environ | {"BLENDER_USER_RESOURCES": str(user_folder)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = python("-c", code, "render", bunny, *options, BLENDER_USER_RESOURCES=str(user_folder))
     assert done.returncode == 0, done.stderr
     assert "Traceback" not in done.stderr

@@ -1,10 +1,5 @@
 """Effects go with their strips, and come back with them: deleted, undone, cut, pasted, copied; and for other clips."""
 
-import os
-import subprocess
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from support import (
@@ -15,6 +10,7 @@ from support import (
     in_sequencer,
     noise,
     picture_of,
+    python,
     recipe,
     remembering,
     state,
@@ -50,15 +46,7 @@ print("EFFECTS", [effect.start for effect in effects], len({{effect.scene.name f
 def test_many_copies_at_once(tmp_path):
     """Blender moves the items of a collection that grows; what is freed is filled here, so that no one reads on."""
     first = write_frames(tmp_path / "in", np.zeros((1, 24, 40, 3), dtype=np.uint8))
-    done = subprocess.run(
-        [sys.executable, "-c", SCRIPT.format(path=str(first))],
-        env=os.environ | {"MALLOC_PERTURB_": "165"},
-        cwd=Path(__file__).parents[2],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
+    done = python("-c", SCRIPT.format(path=str(first)), MALLOC_PERTURB_="165")
     assert "EFFECTS [1.0, 200.0, 300.0, 400.0, 500.0, 600.0, 700.0] 7" in done.stdout, (done.returncode, done.stderr)
 
 

@@ -8,6 +8,7 @@ import av
 import numpy as np
 import pytest
 from support import effect_of, image_strip, in_sequencer, recipe, request, sequencer, write_frames
+from test_mask_reading import draw
 
 from shutter_addon.blender.data import annotations, recipe_import, selection, source_media, strips
 from shutter_addon.blender.interface import region_gizmo
@@ -294,12 +295,7 @@ def mask(bpy, edit):
     mask = bpy.data.masks.new("mask")
     layer = mask.layers.new(name="layer")
     layer.alpha = 0.5
-    spline = layer.splines.new()
-    spline.points.add(3)
-    for point, corner in zip(spline.points, ((-1, -1), (2, -1), (2, 2), (-1, 2)), strict=True):
-        point.co = point.handle_left = point.handle_right = corner
-        point.handle_left_type = point.handle_right_type = "VECTOR"
-    spline.use_cyclic = True
+    draw(layer, ((-1, -1), (2, -1), (2, 2), (-1, 2)), types=("VECTOR", "VECTOR"))
     return mask
 
 
