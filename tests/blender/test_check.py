@@ -81,9 +81,18 @@ def test_a_sound_edit(noise, check, tmp_path):
             lambda folder: write_frames(folder / "in", np.zeros((FRAMES, 24, 32, 3), np.uint8)),
             "f0001.png: is 32×24, but was 64×48 when the edit was saved",
         ),
+        (lambda folder: shutil.rmtree(folder / "matte"), "m0001.png: no such file"),
+        (lambda folder: (folder / "matte" / "m0001.png").write_bytes(b"none"), "m0001.png: cannot be read"),
+        (lambda folder: (folder / "matte" / "m0008.png").write_bytes(b"none"), "m0008.png: cannot be read"),
     ],
 )
-def test_footage(noise, check, tmp_path, plant, sentence):
+def test_footage_and_mattes(noise, check, tmp_path, plant, sentence):
+    edit, effect, strip = now()
+    write_frames(tmp_path / "matte", np.full((FRAMES, 48, 64, 3), 128, np.uint8), "m")
+    region = {"shutter": "S1", "kind": "matte", "path": "matte/m0001.png"}
+    data = recipe(WINDOW, np.ones(WINDOW), [1, 0, 0, 0], regions=[region])
+    recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data)), tmp_path)
+    assert check()[1] == []
     (found,) = check(change=lambda: plant(tmp_path))[1]
     assert found.startswith('"Shutter": ')
     assert sentence in found
@@ -128,29 +137,6 @@ def test_a_shutter_that_never_opens(noise, check):
         bar.weight = 0
     (found,) = check()[1]
     assert found.startswith('"Shutter": shutter "S1" at frame 1: ')
-
-
-def _matte(tmp_path):
-    edit, effect, strip = now()
-    write_frames(tmp_path / "matte", np.full((FRAMES, 48, 64, 3), 128, np.uint8), "m")
-    region = {"shutter": "S1", "kind": "matte", "path": "matte/m0001.png"}
-    data = recipe(WINDOW, np.ones(WINDOW), [1, 0, 0, 0], regions=[region])
-    recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data)), tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("plant", "sentence"),
-    [
-        (lambda folder: shutil.rmtree(folder / "matte"), "m0001.png: no such file"),
-        (lambda folder: (folder / "matte" / "m0001.png").write_bytes(b"none"), "m0001.png: cannot be read"),
-        (lambda folder: (folder / "matte" / "m0008.png").write_bytes(b"none"), "m0008.png: cannot be read"),
-    ],
-)
-def test_mattes(noise, check, tmp_path, plant, sentence):
-    _matte(tmp_path)
-    assert check()[1] == []
-    (found,) = check(change=lambda: plant(tmp_path))[1]
-    assert sentence in found
 
 
 def test_outlines(noise, check, tmp_path, monkeypatch):
