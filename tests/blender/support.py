@@ -299,23 +299,20 @@ class Like:
         return getattr(self.item, name)
 
 
-def remembering(what):
-    """The names of the extension's modules that remember something, in whatever variable: a path below the folder
-    `what`, or a key that is the number `what`. What a module keeps of things that are gone shows nowhere else."""
+def remembering(key):
+    """The names of the extension's modules that have a key in a dictionary, in whatever variable. What a module keeps
+    of things that are gone shows nowhere else."""
     modules = [module for name, module in sys.modules.items() if name.startswith("shutter_addon.") and module]
-    return {module.__name__.rpartition(".")[2] for module in modules if _mentions(vars(module), what, set())}
+    return {module.__name__.rpartition(".")[2] for module in modules if _has(vars(module), key, set())}
 
 
-def _mentions(value, what, seen: set) -> bool:
+def _has(value, key, seen: set) -> bool:
     if id(value) in seen:
         return False
     seen.add(id(value))
-    if isinstance(value, str | Path) and isinstance(what, Path):
-        return str(what) in str(value)
     if isinstance(value, dict):
-        keyed = isinstance(what, int) and what in value
-        return keyed or any(_mentions(part, what, seen) for pair in value.copy().items() for part in pair)
+        return key in value or any(_has(part, key, seen) for pair in value.copy().items() for part in pair)
     if isinstance(value, list | tuple | set | frozenset):
-        return any(_mentions(part, what, seen) for part in tuple(value))
+        return any(_has(part, key, seen) for part in tuple(value))
     is_ours = type(value).__module__.startswith("shutter_addon.")
-    return is_ours and hasattr(value, "__dict__") and _mentions(vars(value), what, seen)
+    return is_ours and hasattr(value, "__dict__") and _has(vars(value), key, seen)

@@ -65,7 +65,7 @@ def same(strokes, *expected):
 
 @pytest.mark.parametrize("by_draw", [True, False], ids=["draw", "pen"])
 @pytest.mark.parametrize("placed", MOVES.values(), ids=MOVES)
-def test_a_stroke_lies_where_it_was_drawn(bpy, region, placed, by_draw):
+def test_a_stroke_lies_where_it_was_drawn_and_is_dragged_from_there(bpy, region, placed, by_draw):
     """At another frame, of a region that has keys; the first drawing stays where it was."""
     move(bpy, 1, Placement())
     move(bpy, 11, placed)
@@ -75,22 +75,12 @@ def test_a_stroke_lies_where_it_was_drawn(bpy, region, placed, by_draw):
     assert same(seen(bpy, 1), FIRST)
     assert same(seen(bpy, 11), SECOND)
     assert not same(seen(bpy, 6), SECOND)
-    pen(bpy, 11, FIRST)
-    assert same(seen(bpy, 11), SECOND, FIRST), "one more at the same frame"
-
-
-@pytest.mark.parametrize("placed", MOVES.values(), ids=MOVES)
-def test_what_was_drawn_is_dragged_from_there(bpy, region, placed):
-    """And the pen finds all at that frame where it is seen."""
-    move(bpy, 1, Placement())
-    move(bpy, 11, placed)
-    pen(bpy, 11, SECOND, by_draw=False)
     x, y = placed.location
     move(bpy, 11, Placement((x + 0.125, y), placed.rotation, placed.scale))
     assert same(seen(bpy, 11), np.add(SECOND, (80, 0)))
     assert same(seen(bpy, 1), FIRST)
     pen(bpy, 11, FIRST)
-    assert same(seen(bpy, 11), np.add(SECOND, (80, 0)), FIRST)
+    assert same(seen(bpy, 11), np.add(SECOND, (80, 0)), FIRST), "one more at the same frame"
     move(bpy, 11, Placement((x + 0.125, y + 0.25), placed.rotation, placed.scale))
     assert same(seen(bpy, 11), np.add(SECOND, (80, 90)), np.add(FIRST, (0, 90)))
 

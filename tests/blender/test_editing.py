@@ -8,7 +8,6 @@ from support import state
 
 from shutter_addon.blender.data import annotations, consistency, fcurves, selection, strips
 from shutter_addon.blender.editing import add_effect, bar_edits, motion_keys, region_edits, shutter_edits
-from shutter_addon.core.model import shutters
 from shutter_addon.media import opencv
 
 RNG = np.random.default_rng(5)
@@ -200,17 +199,6 @@ def test_another_window_and_back_is_exact(three, window):
     three.window = 8
     assert shutters_of(three) == before
     assert [consistency.bars(shutter).tolist() for shutter in three.shutters] == [b.tolist() for b in bars]
-
-
-def test_another_window_keeps_keys_at_their_frames_with_their_ease(three):
-    for curve in fcurves.curves_under(three.id_data, f"{three.path_from_id()}.shutters[0]"):
-        curve.keyframe_points[0].interpolation = "CONSTANT"
-    old = {frame: picture_bars(three, 0, frame) for frame in (1, 5, 9)}
-    three.window = 6
-    keys = curves(three, "shutters[0]").values()
-    assert {tuple((frame, ease) for frame, _, ease in c) for c in keys} == {((1, "CONSTANT"), (9, "BEZIER"))}
-    for frame in (1, 5, 9):
-        assert picture_bars(three, 0, frame) == pytest.approx(shutters.resample(old[frame], 6), abs=1e-6)
 
 
 def test_a_single_keyed_bar_becomes_keys_on_all(effect):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support import LASSO, effect_of, recipe, write_movie
+from support import LASSO, effect_of, noise, recipe, write_movie
 
 from shutter_addon.blender import handlers
 from shutter_addon.blender.data import annotations, fcurves, selection
@@ -31,14 +31,9 @@ def large_movie(tmp_path_factory):
     return make_movie(tmp_path_factory.mktemp("movie") / "large.mkv", 40, 40)
 
 
-def make_movie(path, width, height, count=40):
-    """Frames that differ, each of four coloured quarters; 24 fps."""
-    frames = np.empty((count, height, width, 3), np.uint8)
-    frames[:] = np.arange(40, 40 + 4 * count, 4)[:, None, None, None]
-    frames[:, : height // 2, : width // 2, 0] = 255
-    frames[:, height // 2 :, : width // 2, 1] = 255
-    frames[:, height // 2 :, width // 2 :, 2] = np.arange(250, 250 - 4 * count, -4)[:, None, None]
-    return write_movie(path, frames)
+def make_movie(path, width, height):
+    """Forty frames of large pixels; 24 fps."""
+    return write_movie(path, noise(40, height // 8, width // 8, 3).repeat(8, 1).repeat(8, 2))
 
 
 @pytest.fixture
