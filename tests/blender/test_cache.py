@@ -93,31 +93,22 @@ CHANGES = {
 
 
 @pytest.mark.parametrize("change", CHANGES)
-def test_a_change_is_rendered(bpy, edit, effect, render, change):
+def test_a_change_is_rendered_and_so_are_undo_and_redo(bpy, edit, effect, render, change):
     """And equals what a render without any cache gives."""
-    before = render(edit, [FRAME])[FRAME]
-    CHANGES[change](edit)
-    bpy.context.view_layer.update()
-    after = render(edit, [FRAME])[FRAME]
-    assert not np.array_equal(after, before)
-    edit.sequence_editor.use_cache_raw = edit.sequence_editor.use_cache_final = False
-    render(edit, [FRAME + 1])
-    assert np.array_equal(render(edit, [FRAME])[FRAME], after)
-
-
-@pytest.mark.parametrize("change", ["change_value", "change_property", "draw_stroke", "erase_stroke"])
-def test_undo_and_redo_are_rendered(bpy, edit, effect, render, change):
     before = render(edit, [FRAME])[FRAME]
     bpy.ops.ed.undo_push(message="before")
     CHANGES[change](edit)
+    bpy.context.view_layer.update()
     bpy.ops.ed.undo_push(message="after")
     after = render(edit, [FRAME])[FRAME]
     assert not np.array_equal(after, before)
-    for _ in range(2):
-        bpy.ops.ed.undo()
-        assert np.array_equal(render(bpy.context.scene, [FRAME])[FRAME], before)
-        bpy.ops.ed.redo()
-        assert np.array_equal(render(bpy.context.scene, [FRAME])[FRAME], after)
+    for step, expected in ((bpy.ops.ed.undo, before), (bpy.ops.ed.redo, after)) * 2:
+        step()
+        edit = bpy.context.scene
+        assert np.array_equal(render(edit, [FRAME])[FRAME], expected)
+    edit.sequence_editor.use_cache_raw = edit.sequence_editor.use_cache_final = False
+    render(edit, [FRAME + 1])
+    assert np.array_equal(render(edit, [FRAME])[FRAME], after)
 
 
 def test_the_cache_is_on(bpy, edit, effect, render):

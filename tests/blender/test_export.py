@@ -248,21 +248,6 @@ def test_what_is_imported_is_shown(effect_on):
     assert not list(effect_on[1].scene.annotation.layers)
 
 
-@pytest.mark.parametrize("ease", ["linear", "bezier"])
-def test_a_source_time_that_stands_still_keeps_its_direction(effect_on, ease):
-    """At the last key of a ramp, and in a freeze behind it; a jump has none."""
-    edit, effect, _ = effect_on
-    shutter_edits.add_shutter(effect)
-    keys = [(1, 10, ease), (11, 20, ease), (21, 20, ease)]
-    keys += [(frame, value, "constant") for frame, value in ((31, 5), (41, 5), (51, 15))]
-    effect.use_source_time = True
-    fcurves.set_keys(edit, f"{effect.path_from_id()}.source_time", 0, keys)
-    backward = {frame: source_time(edit, effect, frame)[1] for frame in (1, 6, 11, 16, 26, 31, 36, 41, 51, 90)}
-    assert [frame for frame, found in backward.items() if found] == [26, 31, 36, 41, 51, 90]
-    fcurves.set_keys(edit, f"{effect.path_from_id()}.source_time", 0, [(1, 10, "constant"), (11, 5, "constant")])
-    assert not source_time(edit, effect, 11)[1]
-
-
 def test_a_source_time_without_keys_holds_a_frame(effect_on):
     apply(effect_on, PLAIN)
     effect_on[1].use_source_time, effect_on[1].source_time = True, 3.5
