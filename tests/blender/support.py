@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import os
 import subprocess
 import sys
 import wave
@@ -78,6 +79,11 @@ def refused(done, *words):
         assert word.lower() in lines[0].lower()  # the system says "No space left", we say "no space left"
 
 
+def noise(*shape, seed=0):
+    """Random bytes, mostly frames (n, H, W, C)."""
+    return np.random.default_rng(seed).integers(0, 256, shape, dtype=np.uint8)
+
+
 def flip_bit(path):
     """Changes one bit in the midst of a file."""
     content = bytearray(path.read_bytes())
@@ -96,6 +102,12 @@ def recipe(window, *shutters, regions=(), **options):
             entry["bars"] = [float(b) for b in bars]
         entries.append(entry)
     return {"version": 2, "window": window, "shutters": entries, "regions": list(regions), **options}
+
+
+LASSO = {"name": "Face", "shutter": "S1", "kind": "lasso", "strokes": [[[0.1, 0.1], [0.9, 0.1], [0.5, 0.9]]]}
+MOVED = LASSO | {"keys": [{"frame": 1}, {"frame": 9, "location": [0.2, 0.1], "ease": "bezier"}]}
+# Keyed bars, and a region that moves.
+KEYED = recipe(4, {1: [1, 0, 0, 0], 9: [0, 0, 0, 1]}, [1, 1, 1, 1], regions=[MOVED])
 
 
 def image_strip(edit, first, start=1, channel=1, name="images"):
@@ -155,6 +167,14 @@ def sequencer(bpy):
     area.type = "SEQUENCE_EDITOR"
     with bpy.context.temp_override(window=window, area=area):
         yield area
+
+
+def in_sequencer(bpy, *operators, **words):
+    """Calls operators of Blender's sequencer, one after the other, as its keys do."""
+    with sequencer(bpy) as area, bpy.context.temp_override(region=area.regions[-1]):
+        for operator in operators:
+            assert operator(**words) == {"FINISHED"}
+    bpy.context.view_layer.update()
 
 
 def call(bpy, name, *arguments, **settings):
@@ -230,6 +250,18 @@ class Asked:
         return self.session.run(self.renderer.coefficients, self.request)
 
 
+def python(*arguments, **environment):
+    """A Python of its own, with more in its environment, that has ended."""
+    return subprocess.run(
+        [sys.executable, *map(str, arguments)],
+        cwd=Path(__file__).parents[2],
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
 def packages(folder, blenders_python):
     """A folder, for PYTHONPATH, of what smooth effects need besides what the Blender of a distribution has."""
     import cv2
@@ -267,23 +299,20 @@ class Like:
         return getattr(self.item, name)
 
 
-def remembering(what):
-    """The names of the extension's modules that remember something, in whatever variable: a path below the folder
-    `what`, or a key that is the number `what`. What a module keeps of things that are gone shows nowhere else."""
+def remembering(key):
+    """The names of the extension's modules that have a key in a dictionary, in whatever variable. What a module keeps
+    of things that are gone shows nowhere else."""
     modules = [module for name, module in sys.modules.items() if name.startswith("shutter_addon.") and module]
-    return {module.__name__.rpartition(".")[2] for module in modules if _mentions(vars(module), what, set())}
+    return {module.__name__.rpartition(".")[2] for module in modules if _has(vars(module), key, set())}
 
 
-def _mentions(value, what, seen: set) -> bool:
+def _has(value, key, seen: set) -> bool:
     if id(value) in seen:
         return False
     seen.add(id(value))
-    if isinstance(value, str | Path) and isinstance(what, Path):
-        return str(what) in str(value)
     if isinstance(value, dict):
-        keyed = isinstance(what, int) and what in value
-        return keyed or any(_mentions(part, what, seen) for pair in value.copy().items() for part in pair)
+        return key in value or any(_has(part, key, seen) for pair in value.copy().items() for part in pair)
     if isinstance(value, list | tuple | set | frozenset):
-        return any(_mentions(part, what, seen) for part in tuple(value))
+        return any(_has(part, key, seen) for part in tuple(value))
     is_ours = type(value).__module__.startswith("shutter_addon.")
-    return is_ours and hasattr(value, "__dict__") and _mentions(vars(value), what, seen)
+    return is_ours and hasattr(value, "__dict__") and _has(vars(value), key, seen)

@@ -1,41 +1,24 @@
 """Every operator says what it does, is found by Blender's search; menus have by numbers what a mouse drags."""
 
 from types import SimpleNamespace
+from unittest.mock import MagicMock
 
+import bpy
 import pytest
 
 from shutter_addon.blender.editing import region_edits
 from shutter_addon.blender.interface import menus
 
 
-class Recorder:
-    """Stands for Blender's layout, which only a window has: it notes what is put into it."""
-
-    def __init__(self):
-        self.operators, self.menus, self.properties = [], [], []
-
-    def operator(self, name, **_look):
-        self.operators.append(name)
-        return SimpleNamespace()
-
-    def operator_menu_enum(self, name, _property, **_look):
-        return self.operator(name)
-
-    operator_enum = operator_menu_enum
-
-    def menu(self, name, **_look):
-        self.menus.append(name)
-
-    menu_contents = menu
-
-    def separator(self):
-        pass
-
-    def prop(self, data, name, **_look):
-        assert name in data.bl_rna.properties
-        self.properties.append(name)
-
-    prop_menu_enum = prop
+def drawn(draw):
+    """What is put into a layout, which only a window has: names of operators, of menus and of properties."""
+    layout = MagicMock(spec=bpy.types.UILayout.bl_rna.functions.keys())
+    draw(SimpleNamespace(layout=layout), bpy.context)
+    calls = [(name, given) for name, given, _ in layout.method_calls]
+    properties = [given for name, given in calls if name.startswith("prop")]
+    assert all(name in data.bl_rna.properties for data, name in properties)
+    operators, menus = ([given[0] for name, given in calls if name.startswith(kind)] for kind in ("operator", "menu"))
+    return operators, menus, [name for _data, name in properties]
 
 
 @pytest.fixture(scope="module")
@@ -44,11 +27,10 @@ def operators(bpy):
     return {f"shutter.{name}": getattr(bpy.ops.shutter, name).get_rna_type() for name in dir(bpy.ops.shutter)}
 
 
-def in_menu(bpy, name: str) -> list[str]:
+def in_menu(name: str) -> list[str]:
     """The operators of a menu and of all that open from it."""
-    recorder = Recorder()
-    getattr(bpy.types, name).draw(SimpleNamespace(layout=recorder), bpy.context)
-    return recorder.operators + [operator for menu in recorder.menus for operator in in_menu(bpy, menu)]
+    operators, menus, _properties = drawn(getattr(bpy.types, name).draw)
+    return operators + [operator for menu in menus for operator in in_menu(menu)]
 
 
 def test_every_operator_has_a_name_of_its_own_and_a_description(operators):
@@ -60,16 +42,12 @@ def test_every_operator_has_a_name_of_its_own_and_a_description(operators):
 
 
 def test_every_operator_is_in_the_menu_of_strips_which_blenders_search_reads(bpy, effect, operators):
-    assert set(in_menu(bpy, "SHUTTER_MT_strip")) == set(operators)
-    recorder = Recorder()
+    assert set(in_menu("SHUTTER_MT_strip")) == set(operators)
     entry = bpy.types.SEQUENCER_MT_strip.draw._draw_funcs[-1]  # Blender tells of what was appended nowhere else
-    entry(SimpleNamespace(layout=recorder), bpy.context)
-    assert recorder.menus == [menus.strip_menu.__name__]
+    assert drawn(entry)[1] == [menus.strip_menu.__name__]
 
 
 def test_a_region_the_split_and_the_probe_are_moved_by_numbers_in_the_menus(bpy, effect):
     region_edits.add_region(effect, effect.shutters[1], "RAMP")
-    recorder = Recorder()
-    for menu in (bpy.types.SHUTTER_MT_of_region, bpy.types.SHUTTER_MT_of_preview):
-        menu.draw(SimpleNamespace(layout=recorder), bpy.context)
-    assert {"location", "rotation", "scale", "split", "probe", "probe_at"} <= set(recorder.properties)
+    properties = drawn(bpy.types.SHUTTER_MT_of_region.draw)[2] + drawn(bpy.types.SHUTTER_MT_of_preview.draw)[2]
+    assert {"location", "rotation", "scale", "split", "probe", "probe_at"} <= set(properties)

@@ -1,10 +1,11 @@
 """Pictures that are begun before Blender asks for them: used where they are right, and never where they are not."""
 
 import threading
+from queue import Queue
 
 import numpy as np
 import pytest
-from support import noise_film, picture_of
+from support import noise, noise_film, picture_of
 
 from shutter_addon.blender.data import snapshot
 from shutter_addon.blender.devices import available
@@ -17,9 +18,7 @@ from shutter_addon.core.stopping import StoppedError
 @pytest.fixture
 def film(bpy, edit, tmp_path):
     """An edit of twelve frames of noise under an effect of two shutters and a line; its source, effect and strip."""
-    noise = np.random.default_rng(0).integers(0, 256, (12, 24, 40, 3), dtype=np.uint8)
-    source, effect, strip = noise_film(edit, noise, tmp_path)
-    return edit, source, effect, strip
+    return edit, *noise_film(edit, noise(12, 24, 40, 3), tmp_path)
 
 
 @pytest.fixture
@@ -35,17 +34,11 @@ def composed(monkeypatch):
     return made
 
 
-def test_each_picture_of_a_film_is_made_once(film, render, composed):
-    edit, *_ = film
-    render(edit, range(1, 13))
-    assert composed == list(range(12))
-
-
-def test_nothing_is_begun_for_single_pictures(film, render, composed):
-    edit, *_ = film
-    render(edit, [5, 2, 9])
+@pytest.mark.parametrize("frames", [range(1, 13), [5, 2, 9]], ids=["film", "single"])
+def test_each_picture_is_made_once_and_no_other(film, render, composed, frames):
+    render(film[0], frames)
     sessions.forget()  # which waits for what was begun
-    assert composed == [4, 1, 8]
+    assert composed == [frame - 1 for frame in frames]
 
 
 CHANGES = {
@@ -73,8 +66,7 @@ def test_a_change_leaves_no_trace(film, render, change):
 
 def test_a_frame_that_cannot_be_read_fails_only_when_it_is_shown(film, render, tmp_path):
     edit = film[0]
-    bad = tmp_path / "in" / "f0008.png"
-    bad.write_bytes(bad.read_bytes()[:60])
+    (tmp_path / "in" / "f0008.png").write_bytes(b"no picture")
     render(edit, [3, 4])  # begins 5, whose window holds the eighth
     with pytest.raises(AssertionError):  # of the fixture, that there was no fault
         render(edit, [5])
@@ -85,14 +77,17 @@ def test_what_a_job_takes_away_meanwhile_is_not_missed(film, monkeypatch, look):
     """Scenes that are gone are forgotten on the main thread; a render job may take up what was begun for them between
     the look at what is known and its removal, which is where this one does: at one of the looks."""
     edit, _source, effect, strip = film
-    found, looks, closed, close = session.RenderSession(lambda: ("cpu", None), None), iter(range(9)), [], Renderer.close
-    is_closed = threading.Event()  # on the session's thread, for which nobody waits
+    found, looks, closed, close = (
+        session.RenderSession(lambda: ("cpu", None), None),
+        iter(range(9)),
+        Queue(),
+        Renderer.close,
+    )
 
     def note(renderer):
         # On its thread, the other session may still close what tests before had.
         if renderer.compositor.name == "NumPy":
-            closed.append(renderer)
-            is_closed.set()
+            closed.put(renderer)
         close(renderer)
 
     monkeypatch.setattr(Renderer, "close", note)
@@ -115,8 +110,8 @@ def test_what_a_job_takes_away_meanwhile_is_not_missed(film, monkeypatch, look):
         found.begin_next(taken, frame, RenderContext(found))
     found.keep(RecentValues())
     assert next(looks) > look
-    assert is_closed.wait(30)
-    assert len(closed) == 1
+    assert closed.get(timeout=30)  # on the session's thread, for which nobody waits
+    assert closed.empty()
 
 
 def held_up(session, until):

@@ -1,39 +1,29 @@
 """Every change that changes pictures reaches the sequencer's cache of finished frames; playing does not."""
 
-import shutil
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
-from support import effect_of, image_strip, recipe, request, write_frames
+from support import KEYED, effect_of, image_strip, noise, request, write_frames
 
 from shutter_addon.blender import handlers
 from shutter_addon.blender.data import fcurves, source_media, strips
 from shutter_addon.blender.rendering import invalidation, session
 from shutter_addon.media import sequence
 
-REGION = {"name": "Face", "shutter": "S1", "kind": "lasso", "strokes": [[[0.1, 0.1], [0.9, 0.1], [0.5, 0.9]]]}
-MOVED = REGION | {"keys": [{"frame": 1}, {"frame": 9, "location": [0.2, 0.1], "ease": "bezier"}]}
-KEYED = recipe(4, {1: [1, 0, 0, 0], 9: [0, 0, 1, 0]}, [1, 1, 1, 1], regions=[MOVED], border=True)
 FRAME = 5
 
 
-@pytest.fixture(scope="module")
-def noise(tmp_path_factory):
-    frames = np.random.default_rng(0).integers(0, 256, (30, 32, 32, 3), dtype=np.uint8)
-    return write_frames(tmp_path_factory.mktemp("noise"), frames)
+@pytest.fixture
+def images(tmp_path):
+    return write_frames(tmp_path / "in", noise(30, 32, 32, 3))
 
 
 @pytest.fixture
-def images(noise, tmp_path):
-    return shutil.copytree(noise.parent, tmp_path / "in") / noise.name
-
-
-@pytest.fixture
-def effect(bpy, edit, images):
+def effect(bpy, edit, images, on_numpy):
     """An effect on an image strip, with keyed bars and a region that moves."""
     edit.render.resolution_x = edit.render.resolution_y = 32
-    source = image_strip(edit, images)
-    _strip, effect = effect_of(edit, source, KEYED)
+    _strip, effect = effect_of(edit, image_strip(edit, images), KEYED | {"border": True})
     bpy.context.view_layer.update()
     return effect
 
@@ -102,37 +92,25 @@ CHANGES = {
 }
 
 
-@pytest.mark.usefixtures("on_numpy")
 @pytest.mark.parametrize("change", CHANGES)
-def test_a_change_is_rendered(bpy, edit, effect, render, change):
+def test_a_change_is_rendered_and_so_are_undo_and_redo(bpy, edit, effect, render, change):
     """And equals what a render without any cache gives."""
     before = render(edit, [FRAME])[FRAME]
+    bpy.ops.ed.undo_push(message="before")
     CHANGES[change](edit)
     bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="after")
     after = render(edit, [FRAME])[FRAME]
     assert not np.array_equal(after, before)
+    for step, expected in ((bpy.ops.ed.undo, before), (bpy.ops.ed.redo, after)) * 2:
+        step()
+        edit = bpy.context.scene
+        assert np.array_equal(render(edit, [FRAME])[FRAME], expected)
     edit.sequence_editor.use_cache_raw = edit.sequence_editor.use_cache_final = False
     render(edit, [FRAME + 1])
     assert np.array_equal(render(edit, [FRAME])[FRAME], after)
 
 
-@pytest.mark.usefixtures("on_numpy")
-@pytest.mark.parametrize("change", ["change_value", "change_property", "draw_stroke", "erase_stroke"])
-def test_undo_and_redo_are_rendered(bpy, edit, effect, render, change):
-    before = render(edit, [FRAME])[FRAME]
-    bpy.ops.ed.undo_push(message="before")
-    CHANGES[change](edit)
-    bpy.ops.ed.undo_push(message="after")
-    after = render(edit, [FRAME])[FRAME]
-    assert not np.array_equal(after, before)
-    for _ in range(2):
-        bpy.ops.ed.undo()
-        assert np.array_equal(render(bpy.context.scene, [FRAME])[FRAME], before)
-        bpy.ops.ed.redo()
-        assert np.array_equal(render(bpy.context.scene, [FRAME])[FRAME], after)
-
-
-@pytest.mark.usefixtures("on_numpy")
 def test_the_cache_is_on(bpy, edit, effect, render):
     """What the other tests rest on: without the handlers, a frame would be the old one."""
     before = render(edit, [FRAME])[FRAME]
@@ -148,10 +126,7 @@ def test_the_cache_is_on(bpy, edit, effect, render):
 def test_a_file_replaced_in_the_middle_is_rendered(bpy, edit, effect, render, images):
     """In place, as Blender writes over its own renders: the folder tells nothing of it."""
     before = render(edit, [FRAME])[FRAME]
-    replaced = np.full((32, 32, 3), 200, dtype=np.uint8)
-    write_frames(images.parent, [replaced] * FRAME, "other")
-    path = images.parent / f"f{FRAME:04d}.png"
-    path.write_bytes((images.parent / f"other{FRAME:04d}.png").read_bytes())
+    (images.parent / f"f{FRAME:04d}.png").write_bytes((images.parent / "f0030.png").read_bytes())
     after = render(edit, [FRAME])[FRAME]
     assert not np.array_equal(after, before)
     edit.sequence_editor.use_cache_raw = edit.sequence_editor.use_cache_final = False
@@ -160,10 +135,9 @@ def test_a_file_replaced_in_the_middle_is_rendered(bpy, edit, effect, render, im
 
 @pytest.fixture
 def asked(monkeypatch):
-    """The files of which it was asked whether they are the same."""
-    asked, stamp = [], source_media.stamp
-    monkeypatch.setattr(source_media, "stamp", lambda path: asked.append(path) or stamp(path))
-    return asked
+    """Counts the files of which it was asked whether they are the same."""
+    monkeypatch.setattr(source_media, "stamp", Mock(wraps=source_media.stamp))
+    return source_media.stamp
 
 
 @pytest.fixture
@@ -189,10 +163,10 @@ def test_a_redraw_asks_the_ends_of_a_sequence_alone(edit, effect, asked):
     (strip,) = strips.effect_strips(edit)
     invalidation.invalidate_changed(edit)
     for frame in (FRAME, FRAME + 1):
-        asked.clear()
+        asked.reset_mock()
         invalidation.invalidate_changed(edit)
         request(edit, effect, strip, frame)
-        assert len(asked) == 4
+        assert asked.call_count == 4
 
 
 def test_a_film_asks_all_files_before_it_and_then_the_ends_alone(bpy, edit, render, long, asked, monkeypatch):
@@ -200,8 +174,8 @@ def test_a_film_asks_all_files_before_it_and_then_the_ends_alone(bpy, edit, rend
     begin, counts = session.RenderSession.begin_next, []
 
     def begin_next(*arguments):
-        counts.append(len(asked))
-        asked.clear()
+        counts.append(asked.call_count)
+        asked.reset_mock()
         begin(*arguments)
 
     monkeypatch.setattr(session.RenderSession, "begin_next", begin_next)
@@ -219,17 +193,16 @@ def test_what_is_known_of_files_is_bounded(edit, asked):
     source = edit.sequence_editor.strips["images"]
 
     def asks(number):
-        asked.clear()
+        asked.reset_mock()
         source.name = f"images {number}"
         source_media.media_key(source)
-        return len(asked)
+        return asked.call_count
 
     ends, all_files = 2, 2 + len(source.elements)
     assert {asks(number) for number in range(600)} == {all_files}
     assert [asks(number) for number in (599, 400, 0)] == [ends, ends, all_files]
 
 
-@pytest.mark.usefixtures("on_numpy")
 def test_finished_frames_are_kept_while_nothing_changes(bpy, edit, effect, render, monkeypatch):
     """Frames are there even when no file can be read: playing and selecting drop none."""
     before = render(edit, [3, FRAME])

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support import write_frames
 
 from shutter_addon.blender.data import annotations, selection, snapshot
 from shutter_addon.blender.editing import drawn_places, motion_keys, region_edits
@@ -47,22 +48,24 @@ def move(bpy, frame, placed):
     motion_keys.insert(effect, 0)
 
 
+def in_pixels(strokes):
+    """From the picture's middle."""
+    return [points * (640, 360) - (320, 180) for points in strokes]
+
+
 def seen(bpy, frame):
     """The strokes at a frame, in pixels from the picture's middle."""
     scene, effect, strip = selection.active(bpy.context)
-    shape = snapshot.region_at(scene, effect, strip, 0, (frame,)).at(frame)
-    return [points * (640, 360) - (320, 180) for points in shape.strokes]
+    return in_pixels(snapshot.region_at(scene, effect, strip, 0, (frame,)).at(frame).strokes)
 
 
 def same(strokes, *expected):
-    return len(strokes) == len(expected) and all(
-        np.abs(a - b).max() < 1e-3 for a, b in zip(strokes, expected, strict=True)
-    )
+    return len(strokes) == len(expected) and np.abs(np.subtract(strokes, expected)).max() < 1e-3
 
 
 @pytest.mark.parametrize("by_draw", [True, False], ids=["draw", "pen"])
 @pytest.mark.parametrize("placed", MOVES.values(), ids=MOVES)
-def test_a_stroke_lies_where_it_was_drawn(bpy, region, placed, by_draw):
+def test_a_stroke_lies_where_it_was_drawn_and_is_dragged_from_there(bpy, region, placed, by_draw):
     """At another frame, of a region that has keys; the first drawing stays where it was."""
     move(bpy, 1, Placement())
     move(bpy, 11, placed)
@@ -72,23 +75,13 @@ def test_a_stroke_lies_where_it_was_drawn(bpy, region, placed, by_draw):
     assert same(seen(bpy, 1), FIRST)
     assert same(seen(bpy, 11), SECOND)
     assert not same(seen(bpy, 6), SECOND)
-    pen(bpy, 11, FIRST)
-    assert same(seen(bpy, 11), SECOND, FIRST), "one more at the same frame"
-
-
-@pytest.mark.parametrize("placed", MOVES.values(), ids=MOVES)
-def test_what_was_drawn_is_dragged_from_there(bpy, region, placed):
-    """And the pen finds all at that frame where it is seen."""
-    move(bpy, 1, Placement())
-    move(bpy, 11, placed)
-    pen(bpy, 11, SECOND, by_draw=False)
-    further = Placement((placed.location[0] + 0.125, placed.location[1]), placed.rotation, placed.scale)
-    move(bpy, 11, further)
+    x, y = placed.location
+    move(bpy, 11, Placement((x + 0.125, y), placed.rotation, placed.scale))
     assert same(seen(bpy, 11), np.add(SECOND, (80, 0)))
     assert same(seen(bpy, 1), FIRST)
     pen(bpy, 11, FIRST)
-    assert same(seen(bpy, 11), np.add(SECOND, (80, 0)), FIRST)
-    move(bpy, 11, Placement((further.location[0], further.location[1] + 0.25), placed.rotation, placed.scale))
+    assert same(seen(bpy, 11), np.add(SECOND, (80, 0)), FIRST), "one more at the same frame"
+    move(bpy, 11, Placement((x + 0.125, y + 0.25), placed.rotation, placed.scale))
     assert same(seen(bpy, 11), np.add(SECOND, (80, 90)), np.add(FIRST, (0, 90)))
 
 
@@ -133,7 +126,7 @@ def test_a_recipe_keeps_its_meaning(bpy, region):
     exported = snapshot.recipe_of(*selection.active(bpy.context)).regions[0]
     strokes, there = exported.drawings.strokes[exported.drawings.frames.index(11)], exported.placement(11)
     placed = scribbles.transform(strokes, there.location, there.rotation, there.scale, 640 / 360)
-    assert same([points * (640, 360) - (320, 180) for points in placed], SECOND)
+    assert same(in_pixels(placed), SECOND)
 
 
 def test_outlines_stay_as_they_are_drawn(bpy, region):
@@ -141,8 +134,22 @@ def test_outlines_stay_as_they_are_drawn(bpy, region):
     move(bpy, 11, MOVES["shifted"])
     scene, effect, strip = selection.active(bpy.context)
     drawn_places.begin(effect, strip, 0)
-    (curve,) = snapshot.strokes_at(scene, effect, strip, 0, 11)
-    assert same([curve * (640, 360) - (320, 180)], FIRST)
-    region_edits.draw_curves(effect, strip, region, [curve], 11)
-    (curve,) = snapshot.strokes_at(scene, effect, strip, 0, 11)
-    assert same([curve * (640, 360) - (320, 180)], FIRST)
+    strokes = snapshot.strokes_at(scene, effect, strip, 0, 11)
+    assert same(in_pixels(strokes), FIRST)
+    region_edits.draw_curves(effect, strip, region, strokes, 11)
+    assert same(in_pixels(snapshot.strokes_at(scene, effect, strip, 0, 11)), FIRST)
+
+
+def test_a_picture_point_lies_where_blender_draws_it(bpy, edit, render, tmp_path):
+    """annotations.picture_to_image against a bright pixel block in a rendered, transformed strip."""
+    picture = np.zeros((1, 40, 60, 3), dtype=np.uint8)
+    picture[0, 10:14, 40:44] = 255  # centre: 42/60 across, 12/40 from the top
+    strip = edit.sequence_editor.strips.new_image("image", str(write_frames(tmp_path / "in", picture)), 1, 1)
+    edit.render.resolution_x, edit.render.resolution_y = 100, 80
+    t = strip.transform
+    t.offset_x, t.offset_y, t.scale_x, t.scale_y, t.rotation, t.origin = 7, -5, 1.2, 0.9, 0.5, (0.3, 0.6)
+    shown = render(edit, [1])[1][..., 0]
+    y, x = (np.indices(shown.shape).reshape(2, -1) * shown.ravel()).sum(axis=1) / shown.sum() + 0.5
+    matrix = annotations.picture_to_image(strip, (60, 40))
+    expected = scribbles.mapped(matrix, np.array([[42 / 60, 1 - 12 / 40]]))[0]
+    assert (x - 50, 40 - y) == pytest.approx(tuple(expected), abs=0.6)

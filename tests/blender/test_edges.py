@@ -4,9 +4,9 @@ import cv2
 import exact_diffusion
 import numpy as np
 import pytest
-from support import effect_of, image_strip, picture_of, recipe, request, state, write_frames
+from support import effect_of, image_strip, picture_of, recipe, request, write_frames
 
-from shutter_addon.blender.rendering import invalidation, previews
+from shutter_addon.blender.rendering import previews
 from shutter_addon.compute.guide import Guides, guiding
 from shutter_addon.core.model import scribbles
 from shutter_addon.media import open_source
@@ -19,44 +19,26 @@ STROKE = {"name": "Belly", "shutter": "S1", "width": 0.03, "strokes": [[[0.36, 0
 def film(tmp_path_factory, bunny):
     """A real film, small, and every tenth frame of it: the first file."""
     with open_source(bunny) as source:
-        frames = [
-            cv2.resize(source.read(10 + 10 * k)[..., :3], SIZE, interpolation=cv2.INTER_AREA) for k in range(COUNT)
-        ]
-    return write_frames(tmp_path_factory.mktemp("film"), np.stack(frames))
-
-
-def effect_recipe(**options):
-    return recipe(3, [1, 1, 1], [1, 0, 0], regions=[STROKE], border=True, **options)
+        frames = [source.read(10 + 10 * k)[..., :3] for k in range(COUNT)]
+    small = [cv2.resize(frame, SIZE, interpolation=cv2.INTER_AREA) for frame in frames]
+    return write_frames(tmp_path_factory.mktemp("film"), small)
 
 
 @pytest.fixture
-def add(bpy, edit):
+def add(edit, film):
     """Puts an effect of a recipe on the film; gives edit, effect and strip."""
 
-    def added(first, data):
-        source = image_strip(edit, first, 1, 1, "film")
+    def added(**options):
         edit.render.resolution_x, edit.render.resolution_y = SIZE
-        strip, effect = effect_of(edit, source, data)
+        data = recipe(3, [1, 1, 1], [1, 0, 0], regions=[STROKE], border=True, **options)
+        strip, effect = effect_of(edit, image_strip(edit, film, name="film"), data)
         return edit, effect, strip
 
     return added
 
 
-def test_keys_are_blenders_and_change_what_is_shown(bpy, add, film):
-    edit, effect, strip = add(film, effect_recipe())
-    for frame, value in ((2, 0.0), (6, 1.0)):
-        effect.edge_aware = value
-        assert effect.keyframe_insert("edge_aware", frame=frame)
-    strengths = [state(edit, effect, strip, frame).options.edge_aware for frame in (1, 2, 4, 6, 9)]
-    assert strengths == pytest.approx([0, 0, 0.5, 1, 1], abs=1e-6)
-    invalidation.invalidate_changed(edit)
-    assert not invalidation.invalidate_changed(edit)
-    effect.keyframe_insert("edge_aware", frame=4)
-    assert invalidation.invalidate_changed(edit)
-
-
-def test_reversed_and_retimed_strips_follow_the_shown_frame(add, film, same_pixels):
-    edit, effect, strip = add(film, effect_recipe(edge_aware=1, aggregate=2))
+def test_reversed_and_retimed_strips_follow_the_shown_frame(add):
+    edit, effect, strip = add(edge_aware=1, aggregate=2)
     still = picture_of(effect.scene, COUNT - 3)
     forward = request(edit, effect, strip, 3)
     edit.sequence_editor.strips["film"].use_reverse_frames = True
@@ -66,12 +48,11 @@ def test_reversed_and_retimed_strips_follow_the_shown_frame(add, film, same_pixe
     assert not np.array_equal(picture_of(effect.scene, COUNT - 3), still)
 
 
-def test_moments_that_are_shown_guide_it(bpy, add, film):
+def test_moments_that_are_shown_guide_it(add):
     """Where the window does not show them: the shutters are open after the shown moment alone."""
-    data = effect_recipe(inbetween=2, time=[{"frame": 1, "value": 3.5}], edge_aware=1, aggregate=2)
-    for shutter, bars in zip(data["shutters"], ([0, 1, 0], [0, 0, 0.5]), strict=True):
-        shutter["bars"] = bars
-    edit, effect, strip = add(film, data)
+    shutters = [{"name": "S0", "bars": [0, 1, 0]}, {"name": "S1", "bars": [0, 0, 0.5]}]
+    time = [{"frame": 1, "value": 3.5}]
+    edit, effect, strip = add(inbetween=2, time=time, edge_aware=1, aggregate=2, shutters=shutters)
     wanted = request(edit, effect, strip, 1)
     assert wanted.index == 5
     moment = wanted.state
@@ -83,10 +64,10 @@ def test_moments_that_are_shown_guide_it(bpy, add, film):
     assert np.abs(request(edit, effect, strip, 4).coefficients() - expected).max() > 0.01
 
 
-def test_a_draft_has_larger_blocks_where_edges_are_followed(add, film, monkeypatch):
+def test_a_draft_has_larger_blocks_where_edges_are_followed(add, monkeypatch):
     """Coefficients of a draft are those of the blocks; films and what has no edges to follow are never drafts."""
     monkeypatch.setattr(previews, "DRAFT_ROWS", SIZE[1] // 3)
-    edit, effect, strip = add(film, effect_recipe(edge_aware=1))
+    edit, effect, strip = add(edge_aware=1)
     exact = request(edit, effect, strip, 3)
     draft = previews.draft(exact.request, exact.renderer.source)
     assert (exact.state.options.aggregate, draft.state.options.aggregate) == (1, 4)

@@ -3,12 +3,15 @@
 import os
 import shutil
 import tempfile
+from contextlib import contextmanager
+from operator import attrgetter
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import OpenImageIO
 import pytest
-from support import EXTENSION, noise_film, started
+from support import EXTENSION, noise, noise_film, started
 
 from shutter_addon.blender.output import edit_feed
 from shutter_addon.blender.output.edit_feed import LevelsFile
@@ -23,8 +26,7 @@ def made(bpy, edit, tmp_path, monkeypatch):
     levels lie in a folder of their own."""
 
     def make(channels=3):
-        noise = np.random.default_rng(0).integers(0, 256, (COUNT, HEIGHT, WIDTH, channels), dtype=np.uint8)
-        found = noise_film(edit, noise, tmp_path)
+        found = noise_film(edit, noise(COUNT, HEIGHT, WIDTH, channels), tmp_path)
         edit.render.dither_intensity = 1
         settings = edit.render.image_settings
         settings.file_format, settings.color_depth, settings.color_mode = "PNG", "8", "RGB"
@@ -42,13 +44,32 @@ def look(edit):
     return strips, editor.use_cache_raw, editor.use_cache_final, editor.active_strip
 
 
+def levels_of(path):
+    return OpenImageIO.ImageBuf(str(path)).get_pixels("uint8")
+
+
+def levels_in(folder):
+    """Of all pictures of the film there, which are removed."""
+    found = np.stack([levels_of(path) for path in sorted(folder.iterdir())])
+    shutil.rmtree(folder)
+    return found
+
+
 def pictures(bpy, edit, folder):
     edit.render.filepath = f"{folder}/"
     assert bpy.ops.render.render(animation=True, scene=edit.name) == {"FINISHED"}
     assert len(list(folder.iterdir())) == edit.frame_end
-    found = np.stack([OpenImageIO.ImageBuf(str(path)).get_pixels("uint8") for path in sorted(folder.iterdir())])
-    shutil.rmtree(folder)
-    return found
+    return levels_in(folder)
+
+
+@contextmanager
+def calling(handlers, function):
+    """While it is one of Blender's handlers, the first one."""
+    handlers.insert(0, function)
+    try:
+        yield
+    finally:
+        handlers.remove(function)
 
 
 @pytest.fixture
@@ -110,19 +131,6 @@ SETTINGS = {
 }
 
 
-@pytest.mark.usefixtures("on_numpy")
-@pytest.mark.parametrize("name", SETTINGS)
-def test_bits_are_the_engines(edit, made, compared, name):
-    source, _effect, strip = made()
-    place, value, expected = SETTINGS[name]
-    owner, _, what = place.partition(".")
-    path, _, what = what.rpartition(".")
-    owner = {"edit": edit, "source": source, "strip": strip}[owner]
-    setattr(owner.path_resolve(path) if path else owner, what, value)
-    edit.frame_end = COUNT if expected else 4
-    assert compared() == expected
-
-
 def keyed(owner, name, values):
     for frame, value in values.items():
         setattr(owner, name, value)
@@ -135,9 +143,12 @@ def above(edit, folder, first=1, stop=COUNT + 1):
     return other
 
 
+def brighten(strip):
+    strip.modifiers.new("Bright", "BRIGHT_CONTRAST").bright = 20
+
+
 def adjusted(edit, source, strip, folder):
-    layer = edit.sequence_editor.strips.new_effect("layer", "ADJUSTMENT", 7, 1, length=COUNT)
-    layer.modifiers.new("Bright", "BRIGHT_CONTRAST").bright = 20
+    brighten(edit.sequence_editor.strips.new_effect("layer", "ADJUSTMENT", 7, 1, length=COUNT))
 
 
 def in_a_transition(edit, source, strip, folder):
@@ -180,17 +191,11 @@ def keyed_effect(edit, source, strip, folder):
 # By name: what changes the edit, its source or the effect's strip, and which frames need no engine then.
 EDITS = {
     "fading": (lambda edit, source, strip, folder: keyed(strip, "blend_alpha", {1: 1.0, COUNT: 0.2}), []),
-    "modified": (
-        lambda edit, source, strip, folder: setattr(strip.modifiers.new("B", "BRIGHT_CONTRAST"), "bright", 20),
-        [],
-    ),
+    "modified": (lambda edit, source, strip, folder: brighten(strip), []),
     "cut": (lambda edit, source, strip, folder: strip.split(frame=4, split_method="SOFT"), ALL),
     "titled": (lambda edit, source, strip, folder: above(edit, folder, 3, 5), [2, 5, 6]),
     "title_is_muted": (lambda edit, source, strip, folder: setattr(above(edit, folder, 3, 5), "mute", True), ALL),
-    "title_comes": (
-        lambda edit, source, strip, folder: keyed(above(edit, folder), "mute", {1: True, 4: False}),
-        [],
-    ),
+    "title_comes": (lambda edit, source, strip, folder: keyed(above(edit, folder), "mute", {1: True, 4: False}), []),
     "adjusted": (adjusted, []),
     "in_a_transition": (in_a_transition, []),
     "in_a_meta": (in_a_meta, []),
@@ -202,11 +207,16 @@ EDITS = {
 
 
 @pytest.mark.usefixtures("on_numpy")
-@pytest.mark.parametrize("name", EDITS)
-def test_bits_are_the_engines_in_another_edit(edit, made, compared, tmp_path, name):
+@pytest.mark.parametrize("name", [*SETTINGS, *EDITS])
+def test_bits_are_the_engines(edit, made, compared, tmp_path, name):
     source, _effect, strip = made()
-    change, expected = EDITS[name]
-    change(edit, source, strip, tmp_path)
+    if name in SETTINGS:
+        place, value, expected = SETTINGS[name]
+        owner, _, what = place.rpartition(".")
+        setattr(attrgetter(owner)(SimpleNamespace(edit=edit, source=source, strip=strip)), what, value)
+    else:
+        change, expected = EDITS[name]
+        change(edit, source, strip, tmp_path)
     edit.frame_end = COUNT if expected else 4
     assert compared() == expected
 
@@ -222,12 +232,9 @@ def test_a_script_may_change_the_effect_at_a_frame(bpy, edit, made, compared, tm
     def change(_scene, *_):
         effect.shutters[0].bars[0].weight = 0.1 * edit.frame_current
 
-    bpy.app.handlers.render_pre.insert(0, change)
-    try:
+    with calling(bpy.app.handlers.render_pre, change):
         assert compared() == ALL
         changed = pictures(bpy, edit, tmp_path / "changed")
-    finally:
-        bpy.app.handlers.render_pre.remove(change)
     edit.frame_set(4)
     change(edit)
     still = pictures(bpy, edit, tmp_path / "still")
@@ -259,15 +266,12 @@ def test_the_edit_is_put_back(bpy, edit, made, tmp_path, how):
         seen.append(look(edit) != before)
         if how == "stopped":
             render_job.job.stopping = True
-        elif how == "saved":
+        else:
             bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "edit.blend"), copy=True)
 
     edit.render.filepath = f"{tmp_path / 'out'}/"
-    bpy.app.handlers.render_post.append(act)
-    try:
+    with calling(bpy.app.handlers.render_post, act):
         bpy.ops.render.render(animation=True)
-    finally:
-        bpy.app.handlers.render_post.remove(act)
     assert seen == [True]
     assert look(edit) == before
     assert len(list((tmp_path / "out").iterdir())) == (4 if how == "stopped" else COUNT)
@@ -290,11 +294,8 @@ def test_a_file_that_is_gone_leaves_the_film_to_the_engine(bpy, edit, made, comp
             for folder in (tmp_path / "temporary").glob(".part-*"):
                 shutil.rmtree(folder)
 
-    bpy.app.handlers.render_post.append(lose)
-    try:
+    with calling(bpy.app.handlers.render_post, lose):
         assert compared() == [2, 3, 4, 5]  # the last one in vain
-    finally:
-        bpy.app.handlers.render_post.remove(lose)
 
 
 def test_a_studios_colour_configuration_leaves_the_film_to_the_engine(bpy, edit, made, compared, tmp_path, monkeypatch):
@@ -310,14 +311,14 @@ def test_a_studios_colour_configuration_leaves_the_film_to_the_engine(bpy, edit,
 
 @pytest.mark.parametrize(("width", "height"), [(7, 5), (16, 64), (40, 65)])
 def test_a_file_whose_pixels_are_replaced(tmp_path, width, height):
-    levels = np.random.default_rng(0).integers(0, 256, (2, height, width, 4), dtype=np.uint8)
+    levels = noise(2, height, width, 4)
     levels[..., 3] = 255
     file = LevelsFile(tmp_path / "levels.tif", width, height)
     spec = OpenImageIO.ImageBuf(str(file.path)).spec()
     assert (spec.tile_width % 16, spec.tile_height) == (0, 64)
     for shown in levels:
         file.write(shown)
-        assert np.array_equal(OpenImageIO.ImageBuf(str(file.path)).get_pixels("uint8"), shown)
+        assert np.array_equal(levels_of(file.path), shown)
     file.close()
 
 
@@ -343,8 +344,6 @@ def test_blender_itself_renders_the_same(bpy, edit, made, blender, tmp_path):
         done = blender(tmp_path / "edit.blend", "--python-expr", module + told, "-a")
         assert done.returncode == 0, done.stderr
         assert done.stdout.count("FED") == fed, done.stdout + done.stderr
-        paths = sorted((tmp_path / "out").iterdir())
-        assert len(paths) == COUNT
-        films.append([OpenImageIO.ImageBuf(str(path)).get_pixels("uint8").tobytes() for path in paths])
-        shutil.rmtree(tmp_path / "out")
-    assert films[0] == films[1]
+        films.append(levels_in(tmp_path / "out"))
+        assert len(films[-1]) == COUNT
+    assert np.array_equal(*films)

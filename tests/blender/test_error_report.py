@@ -1,7 +1,6 @@
 """Copy Report: what it says is so, and it names nothing, whatever is called by a name and whatever went wrong."""
 
 import ast
-import json
 import re
 import shutil
 import sys
@@ -10,27 +9,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support import recipe, sequencer, write_frames
+from support import effect_of, image_strip, recipe, sequencer, write_frames
 
 from shutter_addon.blender import command
-from shutter_addon.blender.data import recipe_import, selection
+from shutter_addon.blender.data import selection
 from shutter_addon.blender.devices import available
-from shutter_addon.blender.editing import add_effect, bar_edits
+from shutter_addon.blender.editing import bar_edits
 from shutter_addon.blender.output import error_report
 from shutter_addon.blender.output.error_report import without_paths
-from shutter_addon.core.recipes import recipe_file
+from shutter_addon.core import recent_errors
 
 NAME = "Qanarix"
 ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(autouse=True)
-def _nothing_told():
-    from shutter_addon.core import recent_errors
-
-    recent_errors._lines = []  # private: what other tests told
-    yield
-    recent_errors._lines = []  # private: what other tests told
+def _nothing_told(monkeypatch):
+    monkeypatch.setattr(recent_errors, "_lines", [])  # private: what other tests told
 
 
 @pytest.fixture
@@ -41,15 +36,12 @@ def named(bpy, edit, tmp_path, monkeypatch):
     for variable, value in {"HOME": home, "USERPROFILE": home, "USER": NAME, "LOGNAME": NAME, "USERNAME": NAME}.items():
         monkeypatch.setenv(variable, str(value))
     first = write_frames(home / "in", np.zeros((6, 24, 40, 3), dtype=np.uint8), NAME)
-    source = edit.sequence_editor.strips.new_image(NAME, str(first), 1, 1)
-    for number in range(2, 7):
-        source.elements.append(f"{NAME}{number:04d}.png")
+    source = image_strip(edit, first, name=NAME)
     edit.render.resolution_x, edit.render.resolution_y, edit.frame_end = 40, 24, 6
-    strip, effect = add_effect.add_effect(edit, source)
     line = {"shutter": "S1", "kind": "line", "width": 0.1, "strokes": [[[0.2, 0.2], [0.3, 0.8]]]}
     ramp = {"shutter": "S0", "kind": "ramp", "ramp": "radial"}
     data = recipe(4, {1: [1, 1, 1, 1], 5: [1, 0, 0, 0]}, [0, 0, 1, 0], regions=[line, line, ramp])
-    recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data)))
+    strip, effect = effect_of(edit, source, data)
     edit.timeline_markers.new(NAME, frame=2)
     edit[NAME] = NAME
     for item in (effect, *effect.shutters, *effect.regions, strip, source, *edit.sequence_editor.channels):
@@ -91,10 +83,8 @@ def test_versions_and_device_are_those_that_there_are(bpy, edit):
     assert bpy.app.version_string in line(text, "- Blender:")
     assert bpy.app.build_hash.decode() in line(text, "- Blender:")
     assert ".".join(map(str, sys.version_info[:3])) in line(text, "- System:")
-    packages = line(text, "- Packages:")
-    assert f"numpy {np.__version__}" in packages
-    assert f"av {av.__version__}" in packages
-    assert f"cv2 {cv2.__version__}" in packages
+    for package in (np, av, cv2):
+        assert f"{package.__name__} {package.__version__}" in line(text, "- Packages:")
     kind, lesser = available.choose("auto")
     assert f"- Renders: {available.name(kind)} ({kind})" in text
     assert (lesser or "") in text
@@ -117,9 +107,8 @@ def test_what_the_edit_is_made_of(bpy, named):
     assert "- Strips: 1 IMAGE, 1 SCENE" in text
     assert line(text, "- Effect:").startswith("- Effect: window 4, ")
     assert "  - footage: png, 3 channels of uint8, 40×24, 6 frames, read as uint8, alpha opaque" in text
-    assert "  - 2 × shutter, defaults" in text
-    assert "  - 2 × region, defaults" in text
-    assert "  - 1 × region, kind RAMP, ramp RADIAL" in text
+    for told in ("2 × shutter, defaults", "2 × region, defaults", "1 × region, kind RAMP, ramp RADIAL"):
+        assert f"  - {told}" in text
     assert "cannot be shown" not in text
     effect.shutters[1].combine, effect.regions[0].is_layer = "LIGHTEST", True
     text = report(edit)
@@ -136,17 +125,17 @@ def test_after_several_errors_it_names_nothing(bpy, named, tmp_path):
         raise KeyError(f"{folder}/{NAME}")
 
     with sequencer(bpy), pytest.MonkeyPatch.context() as patch:
-        assert fails(ops.recipe_import, filepath=str(folder / "gone.json"))
-        assert fails(ops.bar_set, bar=7)
+        fails(ops.recipe_import, filepath=str(folder / "gone.json"))
+        fails(ops.bar_set, bar=7)
         effect.scene.camera = None
-        assert fails(ops.recipe_export, filepath=str(folder / NAME / "no" / "folder.json"))
+        fails(ops.recipe_export, filepath=str(folder / NAME / "no" / "folder.json"))
         patch.setattr(bar_edits, "paint", surprised)
-        assert fails(ops.bar_set, bar=1)
+        fails(ops.bar_set, bar=1)
         for file in (folder / "in").iterdir():
             file.unlink()
         edit.sequence_editor.active_strip = next(each for each in edit.sequence_editor.strips_all if each != strip)
         for _ in range(2):
-            assert fails(ops.add_effect)
+            fails(ops.add_effect)
     edit.render.filepath = str(folder / "out")
     bpy.ops.render.render(animation=True, scene=edit.name)
     text = report(edit)
@@ -186,8 +175,6 @@ def test_without_a_window_the_button_says_where_the_report_is(bpy, edit):
 @pytest.mark.usefixtures("named")
 def test_the_command(tmp_path, capsys):
     """It has the edit's faults as well."""
-    from shutter_addon.core import recent_errors
-
     next((tmp_path / NAME / "in").iterdir()).unlink()
     recent_errors._lines = []  # private: what other tests told
     blend = tmp_path / NAME / f"{NAME}.blend"
@@ -211,10 +198,6 @@ def test_no_operator_reports_an_error_past_the_report():
     assert found == ["operator_bases.py"]
 
 
-def fails(call, **given):
-    """Whether an operator has told an error."""
-    try:
-        call(**given)
-    except RuntimeError:
-        return True
-    return False
+def fails(operator, **given):
+    with pytest.raises(RuntimeError):
+        operator(**given)

@@ -2,16 +2,16 @@
 
 import dataclasses
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 from made_recipes import is_same
-from support import source_time, state, write_frames
+from support import recipe, source_time, state, write_frames
+from test_fields import other_value
 
-from shutter_addon.blender.data import fcurves, recipe_import
+from shutter_addon.blender.data import annotations, fcurves, recipe_import
 from shutter_addon.blender.editing import add_effect, shutter_edits
 from shutter_addon.blender.output.matte_export import recipe_for
 from shutter_addon.core.messages import EffectError
@@ -19,155 +19,12 @@ from shutter_addon.core.model.effect import Camera, Effect
 from shutter_addon.core.model.fields import fields_of
 from shutter_addon.core.model.frame_state import Options
 from shutter_addon.core.recipes import recipe_file, records
-from shutter_addon.core.recipes.recipe import CAMERA
+
+sys.path.append(str(Path(__file__).parents[1] / "differential"))
+import cases  # noqa: E402: random recipes
 
 FIRST, LAST = 31, 70
 ASPECT = 40 / 24
-
-
-def short(value):
-    """A decimal that float32 keeps."""
-    return float(str(np.float32(value)))
-
-
-def numbers(low, high):
-    return st.floats(low, high, allow_subnormal=False, width=32).map(short)
-
-
-points = st.tuples(*[st.integers(-1_000_000, 2_000_000).map(lambda n: n / 1e6)] * 2)
-strokes = st.lists(st.lists(points, min_size=1, max_size=4), min_size=1, max_size=3)
-eases = st.sampled_from(["linear", "bezier", "constant"])
-text = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=12)
-frames = st.lists(st.integers(-20, 200).map(lambda n: n / 4), min_size=1, max_size=4, unique=True).map(sorted)
-whole_frames = st.lists(st.integers(-20, 60).map(float), min_size=1, max_size=4, unique=True).map(sorted)
-
-
-@st.composite
-def shutters(draw, name, window):
-    bars = st.lists(numbers(0, 1e6), min_size=window, max_size=window).filter(lambda bars: sum(bars) > 1e-5)
-    color = draw(st.tuples(*[numbers(0, 1)] * 3))
-    if draw(st.booleans()):
-        return records.ShutterRecord(name=name, color=color, bars=draw(bars))
-    keys = [records.BarsKey(frame, draw(bars), draw(eases)) for frame in draw(frames)]
-    return records.ShutterRecord(name=name, color=color, keys=keys)
-
-
-@st.composite
-def regions(draw, names):
-    redrawn = draw(st.booleans())
-    keys = []
-    for i, frame in enumerate(draw(whole_frames if redrawn else frames) if draw(st.booleans()) else []):
-        location = draw(st.tuples(*[numbers(-100, 100)] * 2))
-        rotation = draw(st.integers(-720_00, 720_00)) / 100
-        drawn = draw(strokes) if redrawn and i and draw(st.booleans()) else None
-        keys.append(records.RegionKey(frame, location, rotation, draw(numbers(-50, 50)), draw(eases), drawn))
-    kind, width = draw(st.sampled_from(["line", "lasso"])), draw(numbers(0, 10))
-    named = {"shutter": draw(st.sampled_from(names)), "name": draw(text), "layer": draw(st.booleans())}
-    return records.RegionRecord(kind=kind, width=width, strokes=draw(strokes), keys=keys, **named)
-
-
-@st.composite
-def value_keys(draw, low, high):
-    return [records.ValueKey(frame, draw(numbers(low, high)), draw(eases)) for frame in draw(frames)]
-
-
-def of_field(field):
-    """Values that a recipe may say of a field."""
-    if field.choices:
-        return st.sampled_from(field.words)
-    if isinstance(field.default, bool):
-        return st.booleans()
-    if isinstance(field.default, int):
-        return st.integers(field.least, field.most)
-    return numbers(field.least, field.most) | value_keys(field.least, field.most)
-
-
-options = st.fixed_dictionaries(
-    {
-        field.recipe: of_field(field)
-        for field in fields_of(Options, Effect, Camera).values()
-        if field.recipe not in ("", "window")
-    }
-)
-
-
-@st.composite
-def valid_recipes(draw, longest=6):
-    window = draw(st.integers(1, longest))
-    names = draw(st.lists(text, min_size=1, max_size=3, unique=True))
-    return records.RecipeRecord(
-        version=2,
-        window=window,
-        shutters=[draw(shutters(name, window)) for name in names],
-        regions=draw(st.lists(regions(names), max_size=3)),
-        time=draw(st.just([]) | value_keys(-10, 10000)),
-        camera=draw(st.just([]) | camera_keys()),
-        **draw(options),
-    )
-
-
-@st.composite
-def camera_keys(draw):
-    places = {frame: draw(st.tuples(*[numbers(-100, 100)] * 2)) for frame in draw(frames)}
-    return [
-        records.MoveKey(frame, place, draw(st.integers(-720_00, 720_00)) / 100, draw(numbers(-50, 50)), draw(eases))
-        for frame, place in places.items()
-    ]
-
-
-@st.composite
-def mattes(draw, names):
-    """A matte, of the footage's own file, or a ramp."""
-    fields = {"shutter": draw(st.sampled_from(names)), "name": draw(text), "invert": draw(st.booleans())}
-    fields |= {"layer": draw(st.booleans())}
-    fields |= {"blend": draw(st.sampled_from(["over", "add"])), "keys": draw(st.just([]) | camera_keys())}
-    fields |= {"opacity": draw(numbers(0, 1) | value_keys(0, 1)), "width": draw(numbers(0, 1) | value_keys(0, 1))}
-    if draw(st.booleans()):
-        ramp = draw(st.sampled_from(["linear", "radial", "angle", "luminance"]))
-        return records.RampRecord(kind="ramp", ramp=ramp, **fields)
-    fields |= {"offset": draw(st.integers(-9, 9)), "timing": draw(st.sampled_from(["source", "timeline"]))}
-    channel = draw(st.sampled_from(["luminance", "red", "green", "blue", "alpha"]))
-    return records.MatteRecord(kind="matte", path="in/f0001.png", channel=channel, **fields)
-
-
-@st.composite
-def outlines(draw, names):
-    """Drawn once or several times, on whole frames."""
-    region = draw(regions(names))
-    fields = {"between": draw(st.sampled_from(["carried", "straight"])), "invert": draw(st.booleans())}
-    fields |= {"opacity": draw(numbers(0, 1) | value_keys(0, 1)), "width": draw(numbers(0, 1) | value_keys(0, 1))}
-    fields |= {"blend": draw(st.sampled_from(["over", "add"])), "layer": region.layer, "keys": region.keys}
-    fields |= {"shutter": region.shutter, "name": region.name, "strokes": region.strokes}
-    return records.OutlineRecord(kind="outline", **fields)
-
-
-extremes = st.sampled_from(["lightest", "darkest"])
-thresholds = st.fixed_dictionaries(
-    {"combine": extremes, "threshold": numbers(0, 5) | value_keys(0, 5), "softness": numbers(0, 1) | value_keys(0, 1)}
-)
-combining = (
-    st.fixed_dictionaries({"combine": st.sampled_from(["average", "median"])})
-    | st.fixed_dictionaries({"combine": extremes, "by_luminance": st.booleans()})
-    | thresholds
-)
-
-
-@st.composite
-def following_recipes(draw, longest=6):
-    """Recipes with mattes, whose shutters follow the camera, or regions, which have names of their own."""
-    found = draw(valid_recipes(longest))
-    names = [shutter.name for shutter in found.shutters]
-    laid = draw(st.lists(mattes(names) | outlines(names), max_size=2))
-    regions_ = draw(st.permutations([*found.regions, *laid]))
-    named = [dataclasses.replace(region, name=f"{region.name[:9]}{i}") for i, region in enumerate(regions_)]
-    followed = st.sampled_from([None, CAMERA, *(region.name for region in named)])
-    shutters = [dataclasses.replace(shutter, follow=draw(followed)) for shutter in found.shutters]
-    trails = st.none() | numbers(0, 10) | value_keys(0, 10)
-    shutters = [dataclasses.replace(shutter, trail=draw(trails)) if shutter.follow else shutter for shutter in shutters]
-    combined = [dataclasses.replace(shutter, **draw(combining)) for shutter in shutters]
-    lengths = st.sampled_from(["bars", "timeline"])
-    timed = [each if each.trail is not None else dataclasses.replace(each, length=draw(lengths)) for each in combined]
-    return dataclasses.replace(found, shutters=timed, regions=named)
 
 
 @pytest.fixture
@@ -194,58 +51,67 @@ def folder_of(effect_on):
     return Path(effect_on[0].sequence_editor.strips["images"].directory).parent
 
 
-@settings(max_examples=20, suppress_health_check=list(HealthCheck))
-@given(valid_recipes() | following_recipes())
-def test_a_recipe_comes_back_as_it_was(effect_on, source):
-    apply(effect_on, records.effect_of(source))
-    assert is_same(export(effect_on), records.effect_of(source))
+@pytest.mark.parametrize("seed", range(40))
+def test_a_recipe_comes_back_as_it_was(effect_on, seed):
+    case = cases.make(seed, mixed=True)
+    cases.write_mattes(case, folder_of(effect_on))
+    source = recipe_file.parse(case.recipe)
+    apply(effect_on, source)
+    assert is_same(export(effect_on), source)
 
 
-@settings(max_examples=8, suppress_health_check=list(HealthCheck))
-@given(valid_recipes(), st.floats(-2, 2), st.floats(0.3, 3), st.floats(-300, 300))
-def test_on_a_moved_turned_and_scaled_strip(effect_on, source, rotation, scale, offset):
-    t = effect_on[2].transform
-    t.rotation, t.scale_x, t.scale_y, t.offset_x, t.origin = rotation, scale, 1.3, offset, (0.2, 0.7)
-    apply(effect_on, records.effect_of(source))
+@pytest.mark.parametrize("seed", range(12))
+def test_on_a_moved_turned_and_scaled_strip(effect_on, seed):
+    rng, t = np.random.default_rng(seed), effect_on[2].transform
+    t.rotation, t.scale_x, t.scale_y, t.offset_x = rng.uniform((-2, 0.3, 1.3, -300), (2, 3, 1.3, 300))
+    t.origin = 0.2, 0.7
+    source = recipe_file.parse(json.dumps(cases.random_recipe(rng, 9)))
+    apply(effect_on, source)
     found = export(effect_on)
     for region, wanted in zip(found.regions, source.regions, strict=True):
-        for stroke, original in zip(region.drawings.strokes[0], wanted.strokes, strict=True):
+        for stroke, original in zip(region.drawings.strokes[0], wanted.drawings.strokes[0], strict=True):
             assert np.allclose(stroke, original, rtol=0, atol=2e-6)
     apply(effect_on, found)
     before, after = (records.recipe_of(each) | {"regions": []} for each in (found, export(effect_on)))
     assert after == before
 
 
+def test_odd_values_of_all_fields_come_back(effect_on):
+    """Large and small ones, between frames, and names of any characters."""
+    keys = [{"frame": -4.75, "bars": [0, 1.234567e-05]}, {"frame": 49.5, "bars": [0.1, 3], "ease": "constant"}]
+    named = {"name": "", "color": [0, 1, 0.1], "bars": [1e6, 0]}, {"name": "a\n\x7f\u202e𝄞", "keys": keys}
+    region = {"name": "", "shutter": "", "width": 10, "strokes": [[[-1, 2], [1.999999, 1e-06]]]}
+    region["keys"] = [{"frame": 3.75, "location": [-100, 0.1], "rotation": 720, "scale": -0.001}]
+    camera = [{"frame": -0.5, "location": [-100, 99.99], "rotation": -719.99, "scale": -50}]
+    time = [{"frame": 0.25, "value": -10}, {"frame": 50, "value": 9999.99, "ease": "bezier"}]
+    fields = {field.recipe: other_value(field) for field in fields_of(Options, Effect, Camera).values() if field.recipe}
+    data = recipe(2, shutters=named, regions=[region], camera=camera, time=time) | fields | {"window": 2}
+    for edge_aware in (0.3333333, [{"frame": -5, "value": 0.1}, {"frame": 49.75, "value": 1}]):
+        source = recipe_file.parse(json.dumps(data | {"edge_aware": edge_aware}))
+        apply(effect_on, source)
+        assert is_same(export(effect_on), source)
+
+
+BARS = [
+    {"frame": 3, "bars": [1, 0, 0.5, 0], "ease": "bezier"},
+    {"frame": 17, "bars": [0, 0.2, 0, 1]},
+    {"frame": 30, "bars": [0.3, 0, 0, 1]},
+]
+MOVES = [
+    {"frame": 2, "location": [0.1, 0]},
+    {"frame": 20, "location": [0.5, 0.3], "rotation": 90, "scale": 2, "ease": "bezier"},
+    {"frame": 33, "strokes": [[[0.3, 0.2], [0.9, 0.9], [0.8, 0.1]]], "scale": 0.5},
+]
 BASE = {
     "version": 2,
     "window": 4,
     "inbetween": 2,
     "edge_aware": [{"frame": 4, "value": 0.25, "ease": "bezier"}, {"frame": 24, "value": 1}],
     "time": [{"frame": 2, "value": 1}, {"frame": 20, "value": 9.5, "ease": "bezier"}, {"frame": 31, "value": 3}],
-    "shutters": [
-        {"name": "Plain", "bars": [1, 1, 1, 1]},
-        {
-            "name": "Keyed",
-            "keys": [
-                {"frame": 3, "bars": [1, 0, 0.5, 0], "ease": "bezier"},
-                {"frame": 17, "bars": [0, 0.2, 0, 1]},
-                {"frame": 30, "bars": [0.3, 0, 0, 1]},
-            ],
-        },
-    ],
-    "regions": [
-        {
-            "shutter": "Keyed",
-            "name": "Face",
-            "strokes": [[[0.1, 0.5], [0.4, 0.6]]],
-            "keys": [
-                {"frame": 2, "location": [0.1, 0]},
-                {"frame": 20, "location": [0.5, 0.3], "rotation": 90, "scale": 2, "ease": "bezier"},
-                {"frame": 33, "strokes": [[[0.3, 0.2], [0.9, 0.9], [0.8, 0.1]]], "scale": 0.5},
-            ],
-        }
-    ],
+    "shutters": [{"name": "Plain", "bars": [1, 1, 1, 1]}, {"name": "Keyed", "keys": BARS}],
+    "regions": [{"shutter": "Keyed", "name": "Face", "strokes": [[[0.1, 0.5], [0.4, 0.6]]], "keys": MOVES}],
 }
+PLAIN = recipe(1, [1])
 
 
 def curve(edit, name, index=0):
@@ -314,37 +180,39 @@ def placed_without_keys(edit, effect):
 
 def drawn_apart_from_keys(edit, effect):
     """Drawings before the first key, between keys, and after the last."""
-    layer = effect.scene.annotation.layers[0]
     for number, x in ((25, 3), (43, 9), (68, -4)):
-        drawing = layer.frames.new(number)
-        stroke = drawing.strokes.new()
-        stroke.points.add(2)
-        stroke.points.foreach_set("co", [x, 1, 0, -x, 5, 0])
+        drawing = effect.scene.annotation.layers[0].frames.new(number)
+        annotations.add_stroke(drawing, np.array([(x, 1), (-x, 5)]))
 
 
 def two_of_a_name(edit, effect):
     effect.shutters[0].name = "Keyed"
 
 
+def stretched(edit, effect):
+    """Keys lie at thirds of frames, which float32 has others of than Python."""
+    keys = (100, 0.2, "linear"), (200, 0.8, "linear")
+    fcurves.set_keys(edit, f"{effect.path_from_id()}.edge_aware", 0, keys)
+    effect.regions.clear()
+    edit.render.frame_map_old, edit.render.frame_map_new = 300, 100
+
+
 CASES = [
     blenders_own_handles, free_handles, keyed_by_blender_in_part, elastic, modifiers, extrapolated, muted, sampled,
-    placed_without_keys, drawn_apart_from_keys, two_of_a_name,
+    placed_without_keys, drawn_apart_from_keys, two_of_a_name, stretched,
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize("change", CASES, ids=lambda change: change.__name__)
 def test_what_blender_made_agrees_at_every_frame(effect_on, change):
     """Within the tolerance that export states, and again after importing it."""
-
     apply(effect_on, BASE)
     change(effect_on[0], effect_on[1])
     found = export(effect_on)
-    plain = found
-    wanted = {frame: state(*effect_on, frame) for frame in range(FIRST, LAST + 1)}
-    for frame, instant in wanted.items():
-        check(plain.for_picture(ASPECT).at(frame - FIRST + 1), instant)
+    for frame in range(FIRST, LAST + 1):
+        check(found.for_picture(ASPECT).at(frame - FIRST + 1), state(*effect_on, frame))
         time, _ = source_time(effect_on[0], effect_on[1], frame)
-        assert plain.time.at(frame - FIRST + 1)[0] == pytest.approx(time, abs=1e-3)
+        assert found.time.at(frame - FIRST + 1)[0] == pytest.approx(time, abs=1e-3)
     apply(effect_on, found)
     assert is_same(export(effect_on), found)
 
@@ -360,51 +228,35 @@ def check(instant, wanted):
             assert points == pytest.approx(others, abs=3e-4)
 
 
-def test_keys_of_stretched_time_lie_between_frames(effect_on):
-    """At thirds, which float32 has others of than Python."""
-    edit, effect, _ = effect_on
-    shutter_edits.add_shutter(effect)
-    for frame, value in ((100, 0.2), (200, 0.8)):
-        effect.edge_aware = value
-        edit.keyframe_insert(f"{effect.path_from_id()}.edge_aware", frame=frame)
-    edit.render.frame_map_old, edit.render.frame_map_new = 300, 100
-    plain = export(effect_on).for_picture(ASPECT)
-    for frame in range(FIRST, LAST + 1):
-        wanted = state(*effect_on, frame).options.edge_aware
-        assert plain.at(frame - FIRST + 1).options.edge_aware == pytest.approx(wanted, abs=1e-4)
-
-
-@pytest.mark.parametrize("ease", ["linear", "bezier"])
-def test_a_source_time_that_stands_still_keeps_its_direction(effect_on, ease):
-    """At the last key of a ramp, and in a freeze behind it; a jump has none."""
-    edit, effect, _ = effect_on
-    shutter_edits.add_shutter(effect)
-    keys = [
-        (1, 10, ease),
-        (11, 20, ease),
-        (21, 20, ease),
-        (31, 5, "constant"),
-        (41, 5, "constant"),
-        (51, 15, "constant"),
+def test_what_is_imported_is_shown(effect_on):
+    """With every ease and every kind of key; and another recipe leaves nothing of it."""
+    moves = [
+        {"frame": 2, "ease": "bezier", "location": [0.1, -0.2]},
+        {"frame": 6, "ease": "constant", "rotation": 50, "scale": 0.5},
+        {"frame": 9, "ease": "bezier", "strokes": [[[0.3, 0.9], [0.2, 0.2], [0.9, 0.5]]]},
+        {"frame": 15, "strokes": [[[0, 1], [1, 0]], [[0.5, 0.2]]], "location": [0.3, 0.3], "scale": 2},
     ]
-    effect.use_source_time = True
-    fcurves.set_keys(edit, f"{effect.path_from_id()}.source_time", 0, keys)
-    backward = {frame: source_time(edit, effect, frame)[1] for frame in (1, 6, 11, 16, 26, 31, 36, 41, 51, 90)}
-    assert [frame for frame, found in backward.items() if found] == [26, 31, 36, 41, 51, 90]
-    fcurves.set_keys(edit, f"{effect.path_from_id()}.source_time", 0, [(1, 10, "constant"), (11, 5, "constant")])
-    assert not source_time(edit, effect, 11)[1]
+    lasso = {"shutter": "Plain", "kind": "lasso", "strokes": [[[0.1, 0.2], [0.9, 0.3], [0.4, 0.8]]], "keys": moves}
+    held = {"name": "Held", "keys": [key | {"ease": "constant"} for key in BARS]}
+    data = BASE | {"shutters": [*BASE["shutters"], held], "regions": [*BASE["regions"], lasso], "exposure": "weighted"}
+    for said in (data, PLAIN):
+        apply(effect_on, said)
+        wanted = recipe_file.parse(json.dumps(said)).for_picture(ASPECT)
+        for frame in np.arange(0, 24, 0.5):
+            check(state(*effect_on, frame + FIRST - 1), wanted.at(frame))
+    assert not fcurves.curves_under(effect_on[0], "")
+    assert not list(effect_on[1].scene.annotation.layers)
 
 
 def test_a_source_time_without_keys_holds_a_frame(effect_on):
-    plain = {"version": 2, "window": 1, "shutters": [{"name": "A", "bars": [1]}]}
-    apply(effect_on, plain)
+    apply(effect_on, PLAIN)
     effect_on[1].use_source_time, effect_on[1].source_time = True, 3.5
     assert records.recipe_of(export(effect_on))["time"] == [{"frame": 1, "value": 3.5, "ease": "linear"}]
     effect_on[1].use_source_time = False
     assert export(effect_on).time is None
-    apply(effect_on, plain | {"time": [{"frame": 1, "value": 3.5}]})
+    apply(effect_on, PLAIN | {"time": [{"frame": 1, "value": 3.5}]})
     assert effect_on[1].use_source_time
-    apply(effect_on, plain)
+    apply(effect_on, PLAIN)
     assert not effect_on[1].use_source_time
 
 

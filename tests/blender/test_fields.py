@@ -47,7 +47,7 @@ def whole(bpy, effect, tmp_path):
 EXPORTED = Options, model.Effect, model.Camera, model.Shutter
 
 
-def _other(field: Field):
+def other_value(field: Field):
     """A value beside the default, as the model has it."""
     if field.choices:
         return next(word for word in field.words if word != field.default)
@@ -69,7 +69,7 @@ def _in_blender(field: Field, value):
 def test_a_field_counts_everywhere(whole, kind, name):
     field, (group_of, model_of) = fields_of(kind)[name], KINDS[kind]
     scene, effect, strip = strips.find_effect(whole.scene)
-    group, other = group_of(effect), _other(field)
+    group, other = group_of(effect), other_value(field)
 
     def seen(frame: int = FIRST):
         """What the snapshot has of the field; of what is in no field there, all of it."""

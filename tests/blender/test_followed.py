@@ -1,19 +1,18 @@
-"""Exposures that follow: footage that moves as its keys say stays sharp, however its strip is played."""
+"""Exposures that follow keys, by which what moves stays sharp; and shutters that show lightest, darkest or median."""
 
 import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from support import effect_of, image_strip, recipe, request, write_frames
+from support import effect_of, image_strip, noise, recipe, request, write_frames
 
 from shutter_addon.blender.data import recipe_import, snapshot
 from shutter_addon.blender.editing import bar_edits, region_edits
 from shutter_addon.blender.rendering import sessions
 from shutter_addon.core.frames import light
-from shutter_addon.core.model.clip import Clip
-from shutter_addon.core.model.state_at import state_at
 from shutter_addon.core.recipes import recipe_file
+from shutter_addon.core.recipes.recipe import RecipeError
 
 COUNT, WIDTH, HEIGHT, WINDOW = 24, 120, 72, 6
 INSIDE = np.s_[20:-20, 20:-20]  # where no window reaches beyond the picture
@@ -31,42 +30,35 @@ def place(index, velocity):
     return velocity[0] * index / WIDTH, -velocity[1] * index / HEIGHT
 
 
-def region(keys):
-    """A stroke that lies still but for its keys, {timeline frame: location}."""
-    return {
-        "name": "car",
-        "shutter": "S0",
-        "strokes": [[[0.4, 0.4], [0.6, 0.6]]],
-        "keys": [{"frame": frame, "location": list(location)} for frame, location in keys.items()],
-    }
-
-
 def following(keys, follow="car", **options):
-    data = recipe(WINDOW, [1] * WINDOW, regions=[region(keys)], **options)
+    """The recipe of a stroke that lies still but for its keys, {timeline frame: location}, and of what follows."""
+    keys = [{"frame": frame, "location": list(location)} for frame, location in keys.items()]
+    car = {"name": "car", "shutter": "S0", "strokes": [[[0.4, 0.4], [0.6, 0.6]]], "keys": keys}
+    data = recipe(WINDOW, [1] * WINDOW, regions=[car], **options)
     data["shutters"][0]["follow"] = follow
     return data
 
 
 @pytest.fixture
 def shown(bpy, edit, tmp_path):
-    """Gives the picture of an effect at a timeline frame, and the recipe's, for footage of a velocity; change: what
-    happens to the source strip first."""
+    """Edit, effect, strip, and the request of a picture at a timeline frame, for footage of a velocity."""
 
-    def show(data, velocity, frame, change=lambda source: None, film=codes):
+    def show(data, velocity, frame, film=codes):
         first = write_frames(tmp_path / "in", [film(index, velocity) for index in range(COUNT)])
-        source = image_strip(edit, first)
-        change(source)
-        strip, effect = effect_of(edit, source, data)
+        strip, effect = effect_of(edit, image_strip(edit, first), data)
         return edit, effect, strip, request(edit, effect, strip, frame)
 
     yield show
     sessions.forget()
 
 
+def levels(request):
+    return 255 * light.to_encoded(request.picture()[..., :3].astype(float))
+
+
 def levels_off(request, velocity, film=codes):
     """How far a picture is at most from the shown frame as it is, in 8-bit levels."""
-    picture = light.to_encoded(request.picture()[..., :3].astype(float))
-    return np.abs(255 * picture - film(request.index, velocity))[INSIDE].max()
+    return np.abs(levels(request) - film(request.index, velocity))[INSIDE].max()
 
 
 # Whole pixels are exact, and between pixels the cubic is nearly so.
@@ -129,30 +121,72 @@ def test_a_region_that_is_renamed_or_removed(shown):
 
 
 def test_the_trails_length_is_keyed(shown):
-    """Bars in Blender are those of the recipe; of what is not keyed, too, and of what has no length."""
     velocity, keys = (3, 0), {frame: place((frame - 1) ** 2 / COUNT, (3, 0)) for frame in range(1, COUNT + 1)}
     data = following(keys, position="center")
-    shutter = data["shutters"][0]
-    shutter["trail"] = [{"frame": 5, "value": 0.05}, {"frame": 15, "value": 0.3}]
-    edit, effect, strip, found = shown(data, velocity, 10)
-    bars = core_bars(data, 10)
-    assert found.state.bars == pytest.approx(bars, rel=1e-5)
-    assert 1 < bars.sum() / bars.max() < WINDOW - 0.5
-    shutter["trail"] = 0.175
-    assert core_bars(data, 10) == pytest.approx(bars)
-    for frame, shutter["trail"] in ((10, 0.175), (12, 0.225)):
-        edit.frame_set(frame)
-        bars = core_bars(data, frame)
+    data["shutters"][0]["trail"] = [{"frame": 5, "value": 0.05}, {"frame": 15, "value": 0.3}]
+    edit, effect, strip, _found = shown(data, velocity, 10)
+    for frame in (10, 12):
+        bars = request(edit, effect, strip, frame).state.bars
         open_for = np.count_nonzero(bars > 1e-9 * bars.sum())
+        assert 1 < bars.sum() / bars.max() < WINDOW
+        edit.frame_set(frame)
         assert bar_edits.open_for(edit, effect, strip, 0) == f"Open for {open_for} of {WINDOW} frames here"
     edit.frame_set(COUNT + 1)
     assert bar_edits.open_for(edit, effect, strip, 0) is None, "nothing is shown there"
     effect.shutters[0].length = "FRAMES"
     assert np.array_equal(request(edit, effect, strip, 10).state.bars, np.ones((1, WINDOW)))
-    effect.shutters[0].length, effect.shutters[0].follow = "MOTION", "NOTHING"
-    assert np.array_equal(request(edit, effect, strip, 10).state.bars, np.ones((1, WINDOW)))
 
 
-def core_bars(data, frame):
-    effect = recipe_file.parse(json.dumps(data)).for_picture(WIDTH / HEIGHT)
-    return state_at(effect, Clip(width=WIDTH, height=HEIGHT, count=COUNT), frame).state.bars
+# Lightest, darkest and median
+
+
+def street():
+    """Empty, of noise that stands still."""
+    return 60 + noise(HEIGHT, WIDTH, 3) // 2
+
+
+def crossing(index, _velocity=None):
+    """Two walkers, one bright and one dark, cross it in opposite directions."""
+    picture = street()
+    picture[12:28, 6 * index : 6 * index + 8] = 250
+    picture[36:52, WIDTH - 8 - 6 * index : WIDTH - 6 * index] = 5
+    return picture
+
+
+def combining(*regions, **shutter):
+    data = recipe(9, [1] * 9, [1] + [0] * 8, regions=regions, position="center")
+    data["shutters"][0] |= shutter
+    return data
+
+
+def test_a_median_is_the_empty_street(shown):
+    """Each pixel is clear for more than half of the window."""
+    *_, found = shown(combining(combine="median"), None, 8, crossing)
+    assert 10 * np.log10(255**2 / np.mean((levels(found) - street()) ** 2)) >= 38
+
+
+def test_a_threshold_is_keyed(shown):
+    """From where on the bright walker alone leaves a trail; behind it the shown frame stays."""
+    keys = [{"frame": 4, "value": 2.0, "ease": "constant"}, {"frame": 8, "value": 0.8}]
+    data = combining(combine="lightest", threshold=keys, softness=0.01)
+    edit, effect, strip, found = shown(data, None, 6, crossing)
+    assert np.abs(levels(found) - crossing(5)).max() <= 1, "nothing is as light as that"
+    found = levels(request(edit, effect, strip, 8))
+    trail = np.stack([crossing(7 + k) for k in range(-4, 5)]).max(axis=0)
+    assert np.abs(found[12:28] - np.where(trail[12:28] == 250, 250, crossing(7)[12:28])).max() <= 1
+    assert np.abs(found[36:] - crossing(7)[36:]).max() <= 1, "the dark one stays where it is"
+
+
+def test_a_layer_leaves_its_trail_before_a_sharp_street(shown):
+    """A matte of the bright walker's row: what is behind it is the second shutter's, a single frame."""
+    mask = [[[0, 1 - 28 / HEIGHT], [1, 1 - 28 / HEIGHT], [1, 1 - 12 / HEIGHT], [0, 1 - 12 / HEIGHT]]]
+    row = {"shutter": "S0", "kind": "outline", "between": "straight", "layer": True, "strokes": mask}
+    frames = np.stack([crossing(7 + k) for k in range(-4, 5)])
+    for mode, function in (("lightest", np.max), ("darkest", np.min), ("median", np.median)):
+        *_, found = shown(combining(row, combine=mode), None, 8, crossing)
+        assert np.abs(levels(found) - function(frames, axis=0)).max() <= 1, mode
+
+
+def test_an_average_has_no_threshold():
+    with pytest.raises(RecipeError, match="only lightest and darkest have a threshold"):
+        recipe_file.parse(json.dumps(combining(threshold=0.5)))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import frame_trace
 import numpy as np
-from support import write_movie
+from support import noise, recipe, write_movie
 
 from shutter_addon.blender.editing import whole_edits
 from shutter_addon.blender.rendering import sessions
@@ -15,18 +15,8 @@ from shutter_addon.media import open_source
 
 ROOT = Path(__file__).parents[2]
 
-RECIPE = {
-    "version": 2,
-    "window": 8,
-    "border": True,
-    "shutters": [{"name": "Long", "bars": [1] * 8}, {"name": "Sharp", "bars": [1] + [0] * 7}],
-    "regions": [{"shutter": "Sharp", "kind": "line", "width": 0.02, "strokes": [[[0.3, 0.2], [0.5, 0.8]]]}],
-}
-
-
-def film(path):
-    noise = np.random.default_rng(0).integers(0, 256, (90, 160, 3), np.uint8)
-    return write_movie(path, [np.roll(noise, index, axis=1) for index in range(45)], "libx264", "yuv420p", 25)
+LINE = {"shutter": "S1", "kind": "line", "width": 0.02, "strokes": [[[0.3, 0.2], [0.5, 0.8]]]}
+RECIPE = recipe(8, [1] * 8, [1] + [0] * 7, regions=[LINE], border=True)
 
 
 def ways(bpy, footage, frames, tmp_path):
@@ -47,7 +37,9 @@ def ways(bpy, footage, frames, tmp_path):
 
 
 def test_a_rendered_frame_goes_the_way_of_the_page(bpy, tmp_path):
-    first, second = ways(bpy, film(tmp_path / "film.mp4"), (30, 31), tmp_path)
+    pictures = [np.roll(noise(90, 160, 3), index, axis=1) for index in range(45)]
+    film = write_movie(tmp_path / "film.mp4", pictures, "libx264", "yuv420p", 25)
+    first, second = ways(bpy, film, (30, 31), tmp_path)
     page = (ROOT / "docs" / "developers.md").read_text(encoding="utf-8").partition("\n## How a frame is made\n")[2]
     told = re.findall(r"(?m)^\| `(.+?)` \| `(.+?)` \|", page.split("| File | Function |")[1])
     made = [(stop.path, stop.function) for stop in first]

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support import call, write_frames
+from support import call, does, write_frames
 from test_region_tracking import SIZE, active, centre, drawn, new_source, picture
 
 from shutter_addon.blender.editing import region_edits
@@ -28,16 +28,12 @@ STILL, LONG = [0, 0, 0, 1, 0, 0, 0, 0], [1] * 8
 
 @pytest.mark.parametrize(("name", "own", "rest"), [("sharp_subject", STILL, LONG), ("clean_trail", LONG, STILL)])
 def test_one_click_and_one_undo(bpy, region, name, own, rest):
-    bpy.ops.ed.undo_push(message="before")
-    before = bars(active(bpy)[1])
-    assert call(bpy, name) == {"FINISHED"}
-    effect = active(bpy)[1]
-    assert effect.regions[0].is_layer
-    assert bars(effect) == {"Long": rest, "Sharp": own}
-    assert effect.position == "CENTER"
-    bpy.ops.ed.undo()
-    effect = active(bpy)[1]
-    assert (bars(effect), effect.regions[0].is_layer) == (before, False)
+    def seen(bpy):
+        effect = active(bpy)[1]
+        return bars(effect), effect.regions[0].is_layer, effect.position
+
+    does(bpy, seen, name)
+    assert seen(bpy) == ({"Long": rest, "Sharp": own}, True, "CENTER")
 
 
 def test_a_region_of_the_default_shutter_gets_one_of_its_own(bpy, region):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support import effect_of, recipe, write_movie
+from support import LASSO, effect_of, noise, recipe, write_movie
 
 from shutter_addon.blender import handlers
 from shutter_addon.blender.data import annotations, fcurves, selection
@@ -12,13 +12,9 @@ from shutter_addon.core.model.scribbles import mapped
 
 LEVELS = 1
 STILL = recipe(4, [1, 0, 0, 0])
-TRIANGLE = [[[0.1, 0.1], [0.9, 0.1], [0.5, 0.9]]]
-SCRIBBLED = recipe(
-    4,
-    [1, 0, 0, 0],
-    [0, 0, 0, 1],
-    regions=[{"name": "Face", "shutter": "S1", "kind": "lasso", "strokes": TRIANGLE}],
-)
+TRIANGLE = LASSO["strokes"]
+SCRIBBLED = recipe(4, [1, 0, 0, 0], [0, 0, 0, 1], regions=[LASSO])
+DRAWN_TWICE = SCRIBBLED | {"regions": [LASSO | {"keys": [{"frame": f, "strokes": TRIANGLE} for f in (1, 31)]}]}
 
 
 pytestmark = pytest.mark.usefixtures("no_exception")
@@ -35,14 +31,9 @@ def large_movie(tmp_path_factory):
     return make_movie(tmp_path_factory.mktemp("movie") / "large.mkv", 40, 40)
 
 
-def make_movie(path, width, height, count=40):
-    """Frames that differ, each of four coloured quarters; 24 fps."""
-    frames = np.repeat(np.arange(40, 40 + 4 * count, 4, dtype=np.uint8), height * width * 3)
-    frames = frames.reshape(count, height, width, 3)
-    frames[:, : height // 2, : width // 2, 0] = 255
-    frames[:, height // 2 :, : width // 2, 1] = 255
-    frames[:, height // 2 :, width // 2 :, 2] = np.arange(250, 250 - 4 * count, -4)[:, None, None]
-    return write_movie(path, frames)
+def make_movie(path, width, height):
+    """Forty frames of large pixels; 24 fps."""
+    return write_movie(path, noise(40, height // 8, width // 8, 3).repeat(8, 1).repeat(8, 2))
 
 
 @pytest.fixture
@@ -148,16 +139,14 @@ def test_matched_it_shows_what_its_source_shows(bpy, edit, made, shown, change):
 def test_a_strip_is_mixed_as_its_source_once_it_is_placed(bpy, made):
     """By a factor that no one sees; one that an editor sets stays."""
     strip, _source = made()
-    assert strip.color_multiply == 1
     for name, value in {"scale_x": 0.5, "rotation": 0.2, "filter": "CUBIC_MITCHELL"}.items():
+        assert strip.color_multiply == 1
         before = getattr(strip.transform, name)
         setattr(strip.transform, name, value)
-        bpy.context.view_layer.update()
-        assert 1 < strip.color_multiply < 1.000001
         assert words() == ["transform"]
+        assert 1 < strip.color_multiply < 1.000001
         setattr(strip.transform, name, before)
         bpy.context.view_layer.update()
-        assert strip.color_multiply == 1
     strip.transform.keyframe_insert("offset_x", frame=1)
     bpy.context.view_layer.update()
     assert strip.color_multiply > 1
@@ -171,10 +160,8 @@ def strokes(effect) -> list:
     return [tuple(point.co) for drawing in layer.frames for stroke in drawing.strokes for point in stroke.points]
 
 
-def test_refused_where_nothing_differs(bpy, edit, made):
+def test_refused_without_a_source(bpy, edit, made):
     _strip, source = made()
-    with pytest.raises(RuntimeError, match="The Shutter strip matches its source"):
-        bpy.ops.shutter.match_source()
     edit.sequence_editor.strips.remove(source)
     with pytest.raises(RuntimeError, match="The Shutter strip has no source"):
         bpy.ops.shutter.match_source()
@@ -206,7 +193,7 @@ def test_keys_of_the_transform_are_copied(bpy, edit, made, shown):
     match(bpy)
     assert words() == []
     plain = shown(source, [1, 11, 21])
-    assert apart(plain, {1: plain[1], 11: plain[1], 21: plain[1]}) > 20
+    assert apart(plain, dict.fromkeys(plain, plain[1])) > 20
     assert apart(shown(strip, [1, 11, 21]), plain) <= LEVELS
     assert not fcurves.curves_under(edit, f"{strip.path_from_id()}.transform.rotation")
     fcurves.curves_under(edit, f"{source.path_from_id()}.")[0].keyframe_points[1].co[1] = 11
@@ -257,11 +244,6 @@ def test_parts_of_a_cut_effect_match_their_own_part(bpy, edit, made, shown, capf
     assert len(edit.virtual_shutter.effects) == 2
 
 
-DRAWN_TWICE = SCRIBBLED | {
-    "regions": [SCRIBBLED["regions"][0] | {"keys": [{"frame": f, "strokes": TRIANGLE} for f in (1, 31)]}]
-}
-
-
 def test_scribbles_stay_on_the_picture_of_their_own_frame(bpy, edit, made):
     _strip, source = made(DRAWN_TWICE)
     before = np.array(strokes(edit.virtual_shutter.effects[0]))
@@ -279,15 +261,11 @@ def test_a_larger_file_of_another_aspect_is_followed_by_itself(bpy, edit, made, 
     strip, source = made(SCRIBBLED if scribbled else STILL)
     effect = edit.virtual_shutter.effects[0]
     source.filepath = str(large_movie)
-    bpy.context.view_layer.update()
-    assert annotations.picture_size(effect) == (40, 40)
-    assert words() == []
-    if scribbled:
-        assert on_picture(effect, strip) == pytest.approx(np.array(TRIANGLE[0]), abs=1e-5)
-        before = strokes(effect)
-        bpy.context.view_layer.update()
-        assert strokes(effect) == before
-    else:
+    for _ in range(2):
+        assert words() == []
+        assert annotations.picture_size(effect) == (40, 40)
+        assert not scribbled or on_picture(effect, strip) == pytest.approx(np.array(TRIANGLE[0]), abs=1e-5)
+    if not scribbled:
         assert apart(shown(strip, [1, 20, 40]), shown(source, [1, 20, 40])) <= LEVELS
 
 
@@ -358,12 +336,10 @@ def test_another_size_of_the_edit(bpy, edit, made, shown):
 def test_missing_modifiers_of_the_source_are_told(bpy, edit, made):
     """Of the same type and number is alike; what the source does not use does not count."""
     strip, source = made()
-    effect = edit.virtual_shutter.effects[0]
     strip.modifiers.new("Own", "BRIGHT_CONTRAST")
     source.modifiers.new("Same", "BRIGHT_CONTRAST").bright = 5
     source.modifiers.new("Off", "MASK").mute = True
-    bpy.context.view_layer.update()
-    assert not match_source.shown(effect).lacks_modifiers
-    source.modifiers.new("Own", "COLOR_BALANCE")
-    bpy.context.view_layer.update()
-    assert match_source.shown(effect).lacks_modifiers
+    for lacks in (False, True):
+        bpy.context.view_layer.update()
+        assert match_source.shown(edit.virtual_shutter.effects[0]).lacks_modifiers is lacks
+        source.modifiers.new("Own", "COLOR_BALANCE")

@@ -1,14 +1,15 @@
 """Mattes and ramps in Blender: files, strips of the edit, as they are trimmed and retimed, and what becomes of them."""
 
+import functools
 import json
 import shutil
 
 import av
 import numpy as np
 import pytest
-from support import effect_of, image_strip, read_picture, recipe, request, sequencer, write_frames
+from support import effect_of, image_strip, in_sequencer, recipe, request, sequencer, write_frames
+from test_mask_reading import draw
 
-from shutter_addon.blender import command
 from shutter_addon.blender.data import annotations, recipe_import, selection, source_media, strips
 from shutter_addon.blender.interface import region_gizmo
 from shutter_addon.blender.output import matte_export
@@ -61,15 +62,16 @@ def shown(bpy, edit, footage):
         change(source)
         strip, effect = effect_of(edit, source, content)
 
-        def coefficients(frame):
-            asked = request(edit, effect, strip, frame)
-            levels = 255 * light.to_encoded(asked.picture()[..., 0].astype(float))
-            return (levels - (20 + 10 * asked.index)) / 10
-
-        return strip, effect, coefficients
+        return strip, effect, functools.partial(coefficients_of, edit, effect, strip)
 
     yield show
     sessions.forget()
+
+
+def coefficients_of(edit, effect, strip, frame):
+    asked = request(edit, effect, strip, frame)
+    levels = 255 * light.to_encoded(asked.picture()[..., 0].astype(float))
+    return (levels - (20 + 10 * asked.index)) / 10
 
 
 def strip_of(edit, path, frame=1, count=COUNT, name="matte"):
@@ -159,9 +161,7 @@ def test_a_file_is_moved_with_its_mattes(bpy, edit, shown, matte, footage, tmp_p
     def assert_shown():
         edit = bpy.data.scenes["Edit"]
         (effect,) = edit.virtual_shutter.effects
-        asked = request(edit, effect, strips.effect_strips(edit)[0], 3)
-        levels = 255 * light.to_encoded(asked.picture()[..., 0].astype(float))
-        assert close((levels - (20 + 10 * asked.index)) / 10, values(2) / 255)
+        assert close(coefficients_of(edit, effect, strips.effect_strips(edit)[0], 3), values(2) / 255)
 
     bpy.ops.wm.open_mainfile(filepath=moved)
     assert_shown()
@@ -258,10 +258,13 @@ def test_export_writes_strips_and_points_to_files(edit, shown, matte, tmp_path):
     own = strip_of(edit, matte, 3, 6)
     effect.regions[1].matte, effect.regions[1].strip_name = "STRIP", own.name
     (tmp_path / "out").mkdir()
-    recipe_file.save(
-        matte_export.recipe_for(edit, effect, strip, tmp_path / "out" / "r.json"), tmp_path / "out" / "r.json"
-    )
-    saved = recipe_file.load(tmp_path / "out" / "r.json")
+
+    def export(name):
+        path = tmp_path / "out" / name
+        recipe_file.save(matte_export.recipe_for(edit, effect, strip, path), path)
+        return recipe_file.load(path)
+
+    saved = export("r.json")
     said, before = (records.recipe_of(each)["regions"] for each in (saved, recipe_file.parse(json.dumps(content))))
     assert said[0] == before[0] | {"path": "../matte/m0001.png"}
     assert said[1]["path"] == "r mattes/2 strip_1/0001.png"
@@ -270,9 +273,7 @@ def test_export_writes_strips_and_points_to_files(edit, shown, matte, tmp_path):
     recipe_import.apply(edit, effect, strip, saved, tmp_path / "out")
     for frame, expected in zip((1, 4, 10), before, strict=True):
         assert close(coefficients(frame), expected)
-    again = tmp_path / "out" / "again.json"
-    recipe_file.save(matte_export.recipe_for(edit, effect, strip, again), again)
-    assert records.recipe_of(recipe_file.load(again)) == records.recipe_of(saved)
+    assert records.recipe_of(export("again.json")) == records.recipe_of(saved)
 
 
 def test_an_export_spares_what_it_reads(edit, shown, matte, tmp_path):
@@ -294,12 +295,7 @@ def mask(bpy, edit):
     mask = bpy.data.masks.new("mask")
     layer = mask.layers.new(name="layer")
     layer.alpha = 0.5
-    spline = layer.splines.new()
-    spline.points.add(3)
-    for point, corner in zip(spline.points, ((-1, -1), (2, -1), (2, 2), (-1, 2)), strict=True):
-        point.co = point.handle_left = point.handle_right = corner
-        point.handle_left_type = point.handle_right_type = "VECTOR"
-    spline.use_cyclic = True
+    draw(layer, ((-1, -1), (2, -1), (2, 2), (-1, 2)), types=("VECTOR", "VECTOR"))
     return mask
 
 
@@ -334,31 +330,6 @@ def test_handles_of_a_ramp(bpy, edit, shown, monkeypatch):
         assert pressed == {"CANCELLED"}, "a handle that was there a moment ago moves nothing"
 
 
-def test_weights_are_read_back(bpy, tmp_path, footage):
-    """What `--weights` writes gives the same picture as mattes, for each shutter but the default one."""
-    stroke = {"name": "s", "shutter": "S1", "strokes": [[[0.3, 0.2], [0.4, 0.9]]]}
-    content = recipe(4, [1, 0, 0, 0], [0, 0, 0, 1], [1, 1, 1, 1], border=True, regions=[stroke])
-    lasso = {"name": "l", "shutter": "S2", "kind": "lasso", "strokes": [[[0.6, 0.2], [0.9, 0.3], [0.7, 0.8]]]}
-    content["regions"].append(lasso)
-
-    def render(name, content, *more):
-        (tmp_path / f"{name}.json").write_text(json.dumps(content))
-        where = "--recipe", str(tmp_path / f"{name}.json"), "--output", str(tmp_path / name)
-        assert command.main(["render", str(footage), "--frames", "2:4", *where, *more]) == 0
-        sessions.forget()  # what the command leaves open is closed, as where its process ends
-
-    render("a", content, "--weights", str(tmp_path / "weights"))
-    mattes = [
-        {"shutter": name, "kind": "matte", "path": "weights/0002.exr", "offset": -1, "channel": name, "blend": "add"}
-        for name in ("S1", "S2")
-    ]
-    render("b", content | {"regions": mattes, "border": False})
-    for frame in range(2, 5):
-        first, second = (read_picture(tmp_path / folder / f"{frame:04d}.png") for folder in "ab")
-        assert np.abs(first - second).max() <= 1
-        assert np.ptp(first) > 15
-
-
 def test_cut_and_pasted_effects_have_their_mattes(bpy, edit, shown, matte, mask):
     """The strip that is a matte is cut and pasted as well, and has another name by then."""
     _strip, effect, coefficients = shown(data(region(matte), region(matte, name="n"), region(matte, name="o")))
@@ -369,20 +340,14 @@ def test_cut_and_pasted_effects_have_their_mattes(bpy, edit, shown, matte, mask)
     for strip in edit.sequence_editor.strips:
         strip.select = True
     edit.frame_set(1)
-    with sequencer(bpy) as area, bpy.context.temp_override(region=area.regions[-1]):
-        bpy.ops.sequencer.copy()
-        bpy.ops.sequencer.delete()
-        bpy.context.view_layer.update()
-        assert not edit.virtual_shutter.effects
-        edit.sequence_editor.strips.new_effect("matte", "COLOR", 8, 1, length=5)
-        bpy.ops.sequencer.paste()
-        bpy.context.view_layer.update()
+    in_sequencer(bpy, bpy.ops.sequencer.copy, bpy.ops.sequencer.delete)
+    assert not edit.virtual_shutter.effects
+    edit.sequence_editor.strips.new_effect("matte", "COLOR", 8, 1, length=5)
+    in_sequencer(bpy, bpy.ops.sequencer.paste)
     (effect,) = edit.virtual_shutter.effects
     assert (effect.regions[0].image, effect.regions[2].mask) == (image, mask)
     assert effect.regions[1].strip_name == "matte.001"
-    asked = request(edit, effect, strips.effect_strips(edit)[0], 7)
-    levels = 255 * light.to_encoded(asked.picture()[..., 0].astype(float))
-    assert close((levels - (20 + 10 * asked.index)) / 10, before)
+    assert close(coefficients_of(edit, effect, strips.effect_strips(edit)[0], 7), before)
 
 
 def test_a_changed_mask_drops_finished_frames(bpy, edit, shown, matte, mask):
