@@ -56,13 +56,6 @@ def changed(**channels) -> effect.Effect:
     return effect.Effect((effect.Shutter(name="Sharp", bars=Bars(bars)),), regions, options, edge_aware=edge_aware)
 
 
-def test_bars_that_are_closed_are_told_with_their_frame():
-    closed = changed(bars=Constant(0 * FIRST))
-    for frame in (1, 3):
-        with pytest.raises(EffectError, match=f"at frame {frame}: all bars are zero"):
-            closed.at(frame)
-
-
 @pytest.mark.parametrize(
     "channels",
     [

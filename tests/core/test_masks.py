@@ -75,11 +75,7 @@ grid = st.tuples(st.integers(-1, 5), st.integers(-1, 5)).map(lambda place: (plac
 @given(st.lists(st.lists(grid, min_size=1, max_size=6), min_size=1, max_size=3), st.data())
 def test_no_mask_is_too_odd(polygons, data):
     splines = [
-        straight(
-            corners,
-            data.draw(st.sampled_from([0, 0.1, -0.1, 2])),
-            cyclic=data.draw(st.booleans()),
-        )
+        straight(corners, data.draw(st.sampled_from([0, 0.1, -0.1, 2])), cyclic=data.draw(st.booleans()))
         for corners in polygons
     ]
     options = {name: data.draw(st.booleans()) for name in ("holes", "invert")}

@@ -118,9 +118,3 @@ def test_bars_of_moments_become_those_of_filmed_frames(bars, steps, position, di
     found = shutters.filmed(bars[0], steps, position, partial(shutters.held, steps=steps)).bars
     assert len(found) == -(-len(bars[0]) // steps)
     assert of_frames(found, 1) * steps == pytest.approx(of_frames(bars[0], steps))
-
-
-@given(bars_lists(most=1), STEPS, POSITION)
-def test_a_whole_frame_of_equal_bars_is_one_of_them(bars, steps, position):
-    found = shutters.filmed(np.repeat(bars[0], steps), steps, position, partial(shutters.held, steps=steps))
-    assert (found.bars, found.lost) == (pytest.approx(bars[0]), None)
