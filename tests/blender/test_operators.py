@@ -10,15 +10,9 @@ from support import call, recipe, sequencer
 from shutter_addon import blender
 from shutter_addon.blender.data import annotations, consistency, fcurves, selection
 from shutter_addon.blender.editing import bar_edits, region_edits
+from shutter_addon.blender.interface import operators
 from shutter_addon.core.model import limits, shutters
 from shutter_addon.core.recipes import recipe_file
-
-
-@pytest.fixture
-def operators(bpy):
-    from shutter_addon.blender.interface import operators
-
-    return operators
 
 
 def effect_now(bpy):
@@ -215,46 +209,19 @@ def test_a_recipe_is_imported_and_exported_the_same(bpy, effect, does, tmp_path)
     assert sorted(path.name for path in tmp_path.glob("*.json*")) == ["in.json", "out.json"]
 
 
-def refusal(bpy, name, **settings):
-    """What an operator says when it cannot: one sentence, no traceback."""
-    with pytest.raises(RuntimeError) as caught:
-        call(bpy, name, **settings)
-    said = str(caught.value)
-    assert "Traceback" not in said
-    assert said.startswith("Error: ")
-    assert said.count("\n") == 1
-    return said
-
-
-@pytest.mark.parametrize(
-    ("content", "sentence"),
-    [
-        (b"\xff\xfe\x00", "not a text file"),
-        (json.dumps(RECIPE | {"regions": [REGION | {"shutter": "S7"}]}).encode(), "S7"),
-    ],
-)
-def test_a_broken_recipe_changes_nothing(bpy, effect, tmp_path, content, sentence):
-    """The sentences are core's (tests/core/test_recipe.py)."""
-    path = tmp_path / "broken.json"
-    path.write_bytes(content)
-    before = state(bpy)
-    said = refusal(bpy, "recipe_import", filepath=str(path))
-    assert sentence in said
-    assert str(path) in said
-    assert state(bpy) == before
-
-
 @pytest.mark.parametrize("name", ["recipe_import", "recipe_export"])
-def test_no_such_file(bpy, effect, tmp_path, name):
+def test_a_recipe_that_cannot_be_read_or_written_is_told_and_changes_nothing(bpy, effect, tmp_path, name):
+    """The sentences on what is in a recipe are core's (tests/core/test_recipe.py)."""
+    (tmp_path / "file").write_bytes(b"\xff\xfe\x00")
     before = state(bpy)
-    path = tmp_path / "none" / "r.json"
-    assert f"{path}: No such file or directory" in refusal(bpy, name, filepath=str(path))
-    assert "Is a directory" in refusal(bpy, name, filepath=str(tmp_path))
-    assert "Choose a file" in refusal(bpy, name)
-    (tmp_path / "file").write_text("")
-    assert "Not a directory" in refusal(bpy, name, filepath=str(tmp_path / "file" / "r.json"))
+    paths = {"none/r.json": "No such file or directory", "": "Is a directory", "file/r.json": "Not a directory"}
+    paths |= {"file": "not a text file"} if name == "recipe_import" else {}
+    told = {str(tmp_path / path): f"{tmp_path / path}: {sentence}" for path, sentence in paths.items()}
+    for path, sentence in (told | {"": "Choose a file"}).items():
+        with pytest.raises(RuntimeError, match=f"^Error: {sentence}[^\n]*\n$"):
+            call(bpy, name, filepath=path)
     assert state(bpy) == before
-    assert not path.parent.exists()
+    assert not (tmp_path / "none").exists()
 
 
 # Where nothing can be done
@@ -328,7 +295,7 @@ SITUATIONS = {
 
 
 @pytest.mark.parametrize("situation", SITUATIONS, ids=lambda situation: situation.__name__)
-def test_what_cannot_be_used_says_why(bpy, operators, edit, effect, tmp_path, situation):
+def test_what_cannot_be_used_says_why(bpy, edit, effect, tmp_path, situation):
     effect.inbetween = "1"
     situation(bpy, edit, effect, tmp_path)
     usual, others = SITUATIONS[situation]
@@ -356,17 +323,13 @@ def test_as_few_and_as_many_shutters_as_a_picture_has(bpy, effect):
 
 
 def test_no_more_regions_than_a_picture_has(bpy, effect, preview):
-    full = f"An effect can have at most {limits.MAX_REGIONS} regions"
     for number in range(limits.MAX_REGIONS):
         region = effect.regions.add()
         region.name, region.shutter = str(number), effect.shutters[0].name
-    # None of the second shutter's: whatever is drawn would be a new one.
-    effect.active_shutter = 1
-    for name, settings in (("draw", {}), ("draw", {"new": True})):
-        with pytest.raises(RuntimeError, match=full):
-            call(bpy, name, **settings)
-    effect.active_shutter = 0
-    with pytest.raises(RuntimeError, match=full):
-        call(bpy, "draw", new=True)
+    # The second shutter has none: whatever is drawn would be a new one.
+    for shutter, is_new in ((1, False), (1, True), (0, True)):
+        effect.active_shutter = shutter
+        with pytest.raises(RuntimeError, match=f"An effect can have at most {limits.MAX_REGIONS} regions"):
+            call(bpy, "draw", new=is_new)
     assert bpy.ops.shutter.draw() == {"FINISHED"}
     assert len(effect.regions) == limits.MAX_REGIONS
