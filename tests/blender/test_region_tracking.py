@@ -183,13 +183,11 @@ def test_frames_outside_of_what_was_tracked_stay_where_they_are(bpy, edit, regio
     frames = track_region.frames_to_track(edit, strip, "FORWARD", 20)
     steps = track_region.track(edit, effect, strip, 0, frames, motion)
     assert next(steps) == 19
-    for outside in (range(11, 18), range(20, 31)):
-        for frame in outside:
-            assert placed(bpy, frame) == pytest.approx(before[frame], abs=1e-5)
+    for frame in (*range(11, 18), *range(20, 31)):
+        assert placed(bpy, frame) == pytest.approx(before[frame], abs=1e-5)
     assert list(steps) == [20]
-    for outside in (range(11, 18), range(21, 31)):
-        for frame in outside:
-            assert placed(bpy, frame) == pytest.approx(before[frame], abs=1e-5)
+    for frame in (*range(11, 18), *range(21, 31)):
+        assert placed(bpy, frame) == pytest.approx(before[frame], abs=1e-5)
     assert placed(bpy, 20)[1] == pytest.approx(before[20][1] + 12 / SIZE[1], abs=1.5 / SIZE[1])
 
 

@@ -45,10 +45,8 @@ def edited(bpy, edit, tmp_path):
 def moments(strip, effect, at=8):
     """When each pixel (H, W) is shown, in filmed frames from the shown one on; and over how many frames it is."""
     asked = request(strip.id_data, effect, strip, at)
-    options, places = (
-        asked.state.options,
-        windows.positions(asked.state.options, asked.index, asked.direction),
-    )
+    options = asked.state.options
+    places = windows.positions(options, asked.index, asked.direction)
     coefficients = np.moveaxis(asked.coefficients(), 0, -1)
     exposed = compositor.mixed_shutter(asked.state, coefficients)
     shown = (exposed * places).sum(axis=-1) / exposed.sum(axis=-1)

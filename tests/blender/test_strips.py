@@ -4,16 +4,7 @@ import ctypes
 
 import numpy as np
 import pytest
-from support import (
-    effect_of,
-    image_strip,
-    noise_film,
-    recipe,
-    request,
-    sequencer,
-    write_frames,
-    write_movie,
-)
+from support import effect_of, image_strip, noise_film, recipe, request, sequencer, write_frames, write_movie
 
 from shutter_addon.blender.data import annotations, strips
 from shutter_addon.blender.rendering import job_snapshots as snapshots
