@@ -51,6 +51,15 @@ def shutter(*arguments):
     )
 
 
+def saved_job(folder, footage, **changes):
+    """A job whose edit is saved, of the footage's first frames; changes: of the recipe."""
+    job = Job(folder)
+    shrink(footage, folder / "footage.mp4")
+    (folder / "recipe.json").write_text(json.dumps(RECIPE | changes))
+    shutter("render", folder / "footage.mp4", "--recipe", folder / "recipe.json", "--save", job.edit)
+    return job
+
+
 def shrink(source, path):
     """The first frames of a movie and its sound, small."""
     with av.open(str(source)) as movie, av.open(str(path), "w") as out:
