@@ -82,9 +82,7 @@ def test_add_effect_says_what_is_wrong_with_the_footage(bpy, edit, tmp_path):
     edit.sequence_editor.active_strip = edit.sequence_editor.strips.new_image("i", str(tmp_path / "none.png"), 1, 1)
     with pytest.raises(RuntimeError, match=r"none\.png: no such file"):
         call(bpy, "add_effect")
-    assert len(edit.sequence_editor.strips) == 1
-    assert len(edit.virtual_shutter.effects) == 0
-    assert len(bpy.data.scenes) == 1
+    assert [*map(len, (edit.sequence_editor.strips, edit.virtual_shutter.effects, bpy.data.scenes))] == [1, 0, 1]
 
 
 def test_shutters_come_go_and_move(bpy, effect, does):
@@ -140,7 +138,7 @@ def test_without_a_preview_a_drawn_region_is_one_step_of_undo(bpy, effect, does,
         assert "Open a sequencer with a preview" in capfd.readouterr().out
 
 
-def test_draw_makes_a_region_and_takes_up_the_pen(bpy, effect, preview):
+def test_draw_makes_a_region_and_takes_up_the_pen_for_the_active_one(bpy, effect, preview):
     assert bpy.ops.shutter.draw() == {"FINISHED"}
     assert [(region.name, region.kind) for region in effect.regions] == [("Sharp", "LINE")]
     assert preview.annotation == effect.scene.annotation
@@ -150,27 +148,22 @@ def test_draw_makes_a_region_and_takes_up_the_pen(bpy, effect, preview):
     assert bpy.ops.shutter.draw() == {"FINISHED"}
     assert len(effect.regions) == 1, "one more stroke of the same region"
     assert bpy.ops.shutter.draw(new=True, kind="LASSO") == {"FINISHED"}
-    assert [(region.name, region.kind) for region in effect.regions] == [("Sharp", "LASSO")], (
-        "nothing is drawn in it yet"
-    )
+    kinds = [(region.name, region.kind) for region in effect.regions]
+    assert kinds == [("Sharp", "LASSO")], "nothing is drawn in it yet"
     layer = annotations.layer_of(effect, effect.regions[0])
     annotations.add_stroke(layer.frames.new(1), np.array([[0.0, 0.0], [9.0, 5.0]]))
     assert bpy.ops.shutter.draw(new=True, kind="OUTLINE") == {"FINISHED"}
     assert [(region.name, region.kind) for region in effect.regions] == [("Sharp", "LASSO"), ("Sharp.001", "OUTLINE")]
-    assert bpy.ops.shutter.erase() == {"FINISHED"}
-    assert tool(bpy) == "builtin.annotate_eraser"
-
-
-def test_the_pen_draws_on_the_layer_of_the_active_region(bpy, effect, preview):
-    for _ in range(2):
-        region_edits.add_region(effect, effect.shutters[1])
+    assert preview.annotation.layers.active_note == "Sharp.001"
     effect.active_region = 0
     bpy.ops.shutter.draw()
     assert preview.annotation.layers.active_note == "Sharp"
-    effect.scene.annotation.layers.remove(effect.scene.annotation.layers["Sharp"])
+    effect.scene.annotation.layers.remove(layer)
     bpy.ops.shutter.draw()
     assert preview.annotation.layers.active_note == effect.regions[0].layer
     assert annotations.layer_of(effect, effect.regions[0]) is not None
+    assert bpy.ops.shutter.erase() == {"FINISHED"}
+    assert tool(bpy) == "builtin.annotate_eraser"
 
 
 def test_region_assign(bpy, effect, does):

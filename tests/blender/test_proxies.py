@@ -59,12 +59,7 @@ def assert_read(edit, strip):
 
 @pytest.mark.parametrize(
     ("kind", "storage", "folder"),
-    [
-        ("MOVIE", "PER_STRIP", ""),
-        ("IMAGE", "PER_STRIP", ""),
-        ("MOVIE", "PROJECT", "//of the project"),
-        ("MOVIE", "PROJECT", ""),
-    ],
+    [("MOVIE", "PER_STRIP", ""), ("IMAGE", "PER_STRIP", ""), ("MOVIE", "PROJECT", "//its"), ("MOVIE", "PROJECT", "")],
 )
 def test_where_blender_puts_them(edit, built, kind, storage, folder):
     edit.sequence_editor.proxy_storage, edit.sequence_editor.proxy_dir = storage, folder

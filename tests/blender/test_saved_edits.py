@@ -140,8 +140,6 @@ def test_a_job_of_a_newer_version_ends_an_older_ones_render(bpy, saved, run, tmp
 
 
 def test_missing_media_are_those_of_the_frames(bpy, edit, run, save, tmp_path):
-    """Whatever lies in a strip, in a scene or in a material of it, and whichever command asks."""
-
     def image(name):
         made = bpy.data.images.new(name, 4, 4)
         made.source, made.filepath = "FILE", str(tmp_path / name)

@@ -56,7 +56,6 @@ def test_it_holds_no_blender_data_and_does_not_change(found):
 
 
 def test_many_frames_are_those_of_each(found):
-    """However many are sampled at once, and in whatever way bars are interpolated."""
     for interpolation in ("DISPLACEMENT", "VALUE"):
         found[1].interpolation = interpolation
         single = [snapshot.take(*found, (frame,)).effect.at(frame).key for frame in FRAMES]

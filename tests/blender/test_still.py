@@ -22,7 +22,6 @@ def still_on(edit):
 
 
 def test_frames_of_big_buck_bunny_in_random_order(edit, render, bunny, still_on):
-    """From all over the film."""
     strip = still_on(bunny)
     source = next(s for s in edit.sequence_editor.strips if s.type == "MOVIE")
     frames = range(1, 133, 19)

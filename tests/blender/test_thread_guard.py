@@ -25,8 +25,7 @@ def test_data_on_a_thread_are_found(bpy, effect):
     assert any("has context" in fault for fault in thread_guard.faults())
 
 
-def test_calls_of_blender_on_a_thread_are_found(bpy):
-    """From modules that never import it, too."""
+def test_calls_of_blender_on_a_thread_are_found_in_modules_that_never_import_it(bpy):
     import gpu
 
     timers, texts, scenes = bpy.app.timers, bpy.app.translations, bpy.data.scenes

@@ -78,7 +78,6 @@ def test_shutters_may_follow_one_region_in_ways_of_their_own():
 
 @pytest.mark.parametrize("keys", [[], STRAIGHT[:1], [key(0, scale=0), key(9, (1, 1))]])
 def test_what_does_not_move_is_nothing_to_follow(keys):
-    """The state is that of an effect which follows nothing."""
     assert state_of(made(keys), 0, 0).key == made(keys, follow=None).for_picture(4 / 3).at(0).key
 
 

@@ -80,12 +80,8 @@ STEPS, POSITION = st.sampled_from([1, 2, 4, 8, 16]), st.sampled_from(["start", "
 
 def test_in_one_step_bars_are_what_they_are():
     bars = [0.0, 0.5, 1.0, 0.0, 0.25]
-    for found in (
-        shutters.smoothed(bars, 1),
-        shutters.smoothed(bars, 1, backward=True),
-        shutters.held(bars, 1),
-        shutters.filmed(np.array(bars), 1, "end", np.array).bars,
-    ):
+    assert shutters.filmed(np.array(bars), 1, "end", np.array).bars.tolist() == bars
+    for found in (shutters.smoothed(bars, 1), shutters.smoothed(bars, 1, backward=True), shutters.held(bars, 1)):
         assert found.tolist() == bars
 
 

@@ -46,9 +46,8 @@ class Job:
 
 
 def shutter(*arguments):
-    subprocess.run(
-        [sys.executable, "-m", "shutter_addon", *map(str, arguments)], check=True, capture_output=True, timeout=120
-    )
+    command = [sys.executable, "-m", "shutter_addon", *map(str, arguments)]
+    subprocess.run(command, check=True, capture_output=True, timeout=120)
 
 
 def saved_job(folder, footage, **changes):
