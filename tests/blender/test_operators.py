@@ -23,10 +23,8 @@ def effect_now(bpy):
 def state(bpy):
     """All that operators change."""
     edit = bpy.context.scene
-    keys = {
-        (c.data_path, c.array_index): [tuple(k.co) for k in c.keyframe_points]
-        for c in fcurves.curves_under(edit, "virtual_shutter")
-    }
+    curves = fcurves.curves_under(edit, "virtual_shutter")
+    keys = {(c.data_path, c.array_index): [tuple(k.co) for k in c.keyframe_points] for c in curves}
     effects = [
         (
             effect.window,

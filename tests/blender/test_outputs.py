@@ -96,19 +96,19 @@ def test_names_that_cannot_be(render, frames, tmp_path):
 
 
 def test_a_saved_edit_renders_to_the_same_place(render, blender, frames, tmp_path):
-    """The same bytes, too: nothing in a file says when and where it was rendered."""
+    """Nothing in a file says when and where it was rendered."""
     folder = tmp_path / "{fps}#"
     options = "--output", folder / "out", "--save", folder / "edit.blend", "--frames", "2:3"
     assert render(frames, *options) == (0, "")
     ours = everything(folder / "out")
     shutil.rmtree(folder / "out")
-    keep = f"import os; os.rename({str(folder / 'out')!r}, {str(folder / 'first')!r})"
-    done = blender(folder / "edit.blend", "-a", "--python-expr", keep, "-a")
+    done = blender(folder / "edit.blend", "-a")
     assert done.returncode == 0, done.stderr
-    assert everything(folder / "out") == everything(folder / "first")
-    assert everything(folder / "out").keys() == ours.keys()
-    for name in ours:
-        assert b"Date" not in (folder / "out" / name).read_bytes()
+    found = everything(folder / "out")
+    assert found.keys() == ours.keys()
+    for name, content in found.items():
+        assert b"Date" not in content
+        assert b"Time" not in content
         difference = read_picture(folder / "out" / name) - read_picture(frames.parent / name)
         assert np.abs(difference).max() < 0.1  # levels: another machine's drivers
 

@@ -101,10 +101,8 @@ def apart(bpy, frame, index, *, of=0):
 def keys(bpy, channel="location"):
     """By F-curve of a channel: (frame, value, type, interpolation) of its keys."""
     edit, effect, _strip = active(bpy)
-    return [
-        [(*key.co, key.type, key.interpolation) for key in curve.keyframe_points]
-        for curve in fcurves.curves_under(edit, f"{effect.path_from_id()}.regions[0].{channel}")
-    ]
+    curves = fcurves.curves_under(edit, f"{effect.path_from_id()}.regions[0].{channel}")
+    return [[(*key.co, key.type, key.interpolation) for key in curve.keyframe_points] for curve in curves]
 
 
 def types(bpy):

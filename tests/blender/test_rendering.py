@@ -1,9 +1,5 @@
 """Renders whose pictures fail: they end with a sentence, whoever renders, and nothing without its effect is written."""
 
-import subprocess
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from support import effect_of, image_strip, read_picture, recipe, write_frames
@@ -13,7 +9,6 @@ from shutter_addon.blender.data import source_media, strips
 from shutter_addon.blender.rendering import render_job, sessions
 from shutter_addon.media.rendered_pictures import whole_pictures
 
-ROOT = Path(__file__).parents[2]
 BROKEN = 4
 
 
@@ -215,36 +210,6 @@ def test_a_linked_effect_that_cannot_be_mended_is_refused(bpy, film, tmp_path, c
     assert bpy.ops.render.render(animation=True, scene=linked.name) == {"CANCELLED"}
     assert 'the scene of "Shutter" has no camera' in capfd.readouterr().err
     assert not (tmp_path / "out").exists()
-
-
-SCRIPT = """
-import signal, sys
-import bpy
-from shutter_addon import blender
-signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs are started without
-def stop(scene, *_):
-    if scene.frame_current == 20:
-        from shutter_addon.blender.rendering import pictures
-        pictures.picture = lambda *_, **__: signal.raise_signal(signal.SIGINT)
-blender.register()
-bpy.ops.wm.open_mainfile(filepath=sys.argv[1])
-bpy.app.handlers.render_pre.insert(0, stop)
-print(bpy.ops.render.render(animation=True), flush=True)
-blender.unregister()
-print("ALIVE")
-"""
-
-
-def test_ctrl_c_ends_a_render_in_a_python_of_its_own(bpy, film, tmp_path):
-    to_movie(film, tmp_path / "film.mp4")
-    film.frame_end = film.sequence_editor.strips["Shutter"].right_handle = 2000
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "edit.blend"))
-    command = [sys.executable, "-c", SCRIPT, str(tmp_path / "edit.blend")]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    assert "{'CANCELLED'}\nALIVE" in done.stdout
-    assert "Virtual Shutter: the render was stopped" in done.stderr
-    assert whole_pictures(tmp_path / "film.mp4") == 19
 
 
 def test_blender_itself_ends_with_exit_code_2(bpy, film, blender, tmp_path):

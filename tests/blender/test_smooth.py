@@ -296,35 +296,22 @@ def counted(bars, steps, position):
     return [sum(bars[k : k + steps]) / steps for k in range(0, len(bars), steps)]
 
 
-@pytest.fixture
-def older(bpy, effect, tmp_path):
-    """Has an effect be one of a file of format 1, whose bars count moments; opens that file."""
-
-    def opened(steps, position, window):
-        scene = effect.id_data
-        effect.position, effect.window = position, window
-        rng = np.random.default_rng(5)
-        bars = [rng.random(window) for _ in range(3)]
-        bar_edits.set_bars(effect.shutters[1], bars[1])
-        for frame, weights in ((1, bars[0]), (9, bars[2])):
-            scene.frame_set(frame)
-            bar_edits.set_bars(effect.shutters[0], weights)
-            bar_edits.key_bars(effect, 0)
-        effect.inbetween = str(steps)
-        scene.virtual_shutter.format = 1
-        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "older.blend"))
-        bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "older.blend"))
-        return bpy.context.scene, bars
-
-    return opened
-
-
 @pytest.mark.parametrize(
     ("steps", "window", "position"), [(2, 8, "START"), (8, 12, "CENTER"), (16, 33, "END"), (4, 1, "END")]
 )
-def test_bars_of_format_1_count_filmed_frames_now(older, steps, window, position):
+def test_bars_of_format_1_count_filmed_frames_now(bpy, effect, tmp_path, steps, window, position):
     """Keyed ones, too; recipes of the first version are read alike."""
-    scene, bars = older(steps, position, window)
+    scene, bars = effect.id_data, np.random.default_rng(5).random((3, window))
+    effect.position, effect.window = position, window
+    bar_edits.set_bars(effect.shutters[1], bars[1])
+    for frame, weights in ((1, bars[0]), (9, bars[2])):
+        scene.frame_set(frame)
+        bar_edits.set_bars(effect.shutters[0], weights)
+        bar_edits.key_bars(effect, 0)
+    effect.inbetween, scene.virtual_shutter.format = str(steps), 1
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "older.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "older.blend"))
+    scene = bpy.context.scene
     effect = scene.virtual_shutter.effects[0]
     count = -(-window // steps)
     assert scene.virtual_shutter.format == 2
@@ -336,7 +323,7 @@ def test_bars_of_format_1_count_filmed_frames_now(older, steps, window, position
         assert snapshot.bars_at(scene, effect, 0, frame) == pytest.approx(expected, abs=1e-6)
     paths = {curve.data_path.rpartition("bars[")[2] for curve in fcurves.curves_under(scene, effect.path_from_id())}
     assert paths == {f"{bar}].weight" for bar in range(count)}
-    stored = [float(np.float32(bar)) for bar in bars[1]]
+    stored = bars[1].astype(np.float32).tolist()
     read = made(window, [{"name": "A", "bars": stored}], inbetween=steps, position=position.lower(), version=1)
     options = read.options.at(1)
     assert (options.window, options.skip_repeats) == (count, False)

@@ -87,10 +87,8 @@ def test_every_key_is_kept_on_demand_and_only_in_those_frames(track, film, tmp_p
     assert (found[0].ease, found[0].location, found[-1].location) == ("bezier", [0.5, 0.5], [0.5, 0.5])
     assert {key.scale for key in found} == {1.0}
     # at frame 6, and at those that were not tracked, it is where the keys had put it
-    before, after = (
-        recipe_file.load(tmp_path / name).for_picture(WIDTH / HEIGHT).regions[1].moves.location
-        for name in ("recipe.json", "t.json")
-    )
+    effects = (recipe_file.load(tmp_path / name).for_picture(WIDTH / HEIGHT) for name in ("recipe.json", "t.json"))
+    before, after = (effect.regions[1].moves.location for effect in effects)
     for frame in (1, 2, 3, 6, 9, 10, 11, 12):
         assert after.at(frame) == pytest.approx(before.at(frame)), frame
 
