@@ -59,5 +59,4 @@ def test_alpha_does_not_count():
 @pytest.mark.parametrize("size", [(1, 1), (1, 4), (4, 1)])
 def test_pictures_of_one_row_or_column(size):
     right, down = conductances(np.zeros((*size, 3)), 1.0, size)
-    assert right.shape == (size[0], size[1] - 1)
-    assert down.shape == (size[0] - 1, size[1])
+    assert (right.shape, down.shape) == ((size[0], size[1] - 1), (size[0] - 1, size[1]))

@@ -264,10 +264,8 @@ def test_moments_that_filmed_frames_expose_are_kept(steps, position, way):
             unused = next((k for k in range(steps) if any(bars[len(bars) - 1 - k] for bars in keys)), steps - 1)
             keys = [bars[: len(bars) - unused] for bars in keys]
         eases = [str(each) for each in rng.choice(["linear", "bezier", "constant"], 3)]
-        keyed = [
-            {"frame": frame, "bars": bars.tolist(), "ease": ease}
-            for frame, bars, ease in zip((10, 20, 33), keys, eases, strict=True)
-        ]
+        keyed = zip((10, 20, 33), keys, eases, strict=True)
+        keyed = [{"frame": frame, "bars": bars.tolist(), "ease": ease} for frame, bars, ease in keyed]
         shutter = {"name": "A", "keys": keyed, "combine": way}
         found = first(len(keys[0]), [shutter], inbetween=steps, position=position)
         assert found.lost is None
