@@ -77,6 +77,33 @@ def blenders_python(real_blender):
     return re.search(r"PYTHON (.+)", subprocess.run(command, capture_output=True, text=True, check=True).stdout)[1]
 
 
+@pytest.fixture(scope="session")
+def user_folder(tmp_path_factory):
+    """A Blender user folder with the checkout as an installed extension."""
+    folder = tmp_path_factory.mktemp("user") / "resources"
+    (folder / "extensions" / "user_default").mkdir(parents=True)
+    (folder / "extensions" / "user_default" / "virtual_shutter").symlink_to(ROOT)
+    return folder
+
+
+@pytest.fixture
+def blender(real_blender, user_folder):
+    """Runs the real Blender that the environment names, with the extension enabled."""
+
+    def run(*arguments):
+        command = [*real_blender, "-b", "--factory-startup", "--addons", "bl_ext.user_default.virtual_shutter"]
+        return subprocess.run(
+            [*command, *map(str, arguments)],
+            env=os.environ | {"BLENDER_USER_RESOURCES": str(user_folder)},
+            capture_output=True,
+            text=True,
+            check=False,
+            cwd=ROOT,
+        )
+
+    return run
+
+
 @pytest.fixture
 def same_pixels(tmp_path):
     """Compares two pictures (H, W, C) in 8-bit levels; on failure both and their amplified difference are kept."""

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support import EXTENSION, read_picture, write_frames
+from support import read_picture, write_frames
 
 ROOT = Path(__file__).parents[2]
 
@@ -167,30 +167,3 @@ def command_here(bpy, render_words, capfd):
 
     yield run
     sessions.forget()
-
-
-@pytest.fixture(scope="session")
-def user_folder(tmp_path_factory):
-    """A Blender user folder with the checkout as an installed extension."""
-    folder = tmp_path_factory.mktemp("user") / "resources"
-    (folder / "extensions" / "user_default").mkdir(parents=True)
-    (folder / "extensions" / "user_default" / "virtual_shutter").symlink_to(ROOT)
-    return folder
-
-
-@pytest.fixture
-def blender(real_blender, user_folder):
-    """Runs the real Blender that the environment names, with the extension enabled."""
-
-    def run(*arguments):
-        command = [*real_blender, "-b", "--factory-startup", "--addons", EXTENSION]
-        return subprocess.run(
-            [*command, *map(str, arguments)],
-            env=os.environ | {"BLENDER_USER_RESOURCES": str(user_folder)},
-            capture_output=True,
-            text=True,
-            check=False,
-            cwd=ROOT,
-        )
-
-    return run

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import OpenImageIO
-from support import write_movie
+from support import image_strip, write_movie
 
 COUNT = 30  # frames of footage; of fewer, Blender does not tell whether they keep their own rate
 MOVIES = {
@@ -21,11 +21,11 @@ MOVIES = {
     "prores": ("mov", "prores_ks", "yuv422p10le"),
 }
 IMAGES = {
-    "png": ("png", "uint8", 3),
-    "png 16 bit": ("png", "uint16", 3),
-    "jpeg": ("jpg", "uint8", 3),
-    "tiff 16 bit": ("tif", "uint16", 3),
-    "exr": ("exr", "half", 3),
+    "png": ("png", "uint8"),
+    "png 16 bit": ("png", "uint16"),
+    "jpeg": ("jpg", "uint8"),
+    "tiff 16 bit": ("tif", "uint16"),
+    "exr": ("exr", "half"),
 }
 RATES = (24, 25, 30, 50)
 FILTERS = ("AUTO", "NEAREST", "BILINEAR", "CUBIC_BSPLINE", "CUBIC_MITCHELL", "BOX")
@@ -111,21 +111,14 @@ def _pictures(rng: np.random.Generator, width: int, height: int) -> np.ndarray:
 
 
 def _strip(edit: Any, pictures: np.ndarray, kind: str, folder: Path, rate: Any) -> Any:
-    strips = edit.sequence_editor.strips
     folder.mkdir(parents=True)
     if kind in MOVIES:
         suffix, codec, pixels = MOVIES[kind]
         path = write_movie(folder / f"movie.{suffix}", pictures, codec, pixels, rate)
-        return strips.new_movie("movie", str(path), 1, 1)
-    suffix, samples, channels = IMAGES[kind]
+        return edit.sequence_editor.strips.new_movie("movie", str(path), 1, 1)
+    suffix, samples = IMAGES[kind]
     for i, picture in enumerate(pictures, 1):
-        spec = OpenImageIO.ImageSpec(*picture.shape[1::-1], channels, samples)
-        output = OpenImageIO.ImageOutput.create(f"a.{suffix}")
-        assert output.open(str(folder / f"a{i:02d}.{suffix}"), spec), OpenImageIO.geterror()
-        output.write_image(np.ascontiguousarray(picture.astype(np.float32) / 255))
-        output.close()
-    first, *others = sorted(folder.iterdir())
-    strip = strips.new_image("images", str(first), 1, 1)
-    for other in others:
-        strip.elements.append(other.name)
-    return strip
+        image = OpenImageIO.ImageBuf(np.ascontiguousarray(picture.astype(np.float32) / 255))
+        image.set_write_format(samples)
+        assert image.write(str(folder / f"a{i:02d}.{suffix}")), image.geterror()
+    return image_strip(edit, folder / f"a01.{suffix}")

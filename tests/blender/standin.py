@@ -1,7 +1,8 @@
-"""Random moments between frames in place of optical flow's, so that the right ones are known."""
+"""Films whose motion is known, and random moments between frames in place of optical flow's, which are known, too."""
 
 from itertools import pairwise
 
+import cv2
 import numpy as np
 
 APART = 50  # levels by which frames differ on average that have nothing in common
@@ -46,3 +47,10 @@ def spread(bars, steps):
                 start, end = max((step - 0.5) / steps, 0), min((step + 0.5) / steps, 0.5)
                 weights[place * steps + side * step] += weight / len(sides) * (end - start) / 0.5
     return weights
+
+
+def moving(pixels, count=6, width=320, height=180):
+    """Frames (count, height, width, 3) of a texture that moves to the left by pixels a frame."""
+    noise = np.random.default_rng(2).integers(0, 256, (60, 160, 3), dtype=np.uint8)
+    texture = cv2.resize(noise, None, fx=4, fy=4, interpolation=cv2.INTER_CUBIC)
+    return np.stack([texture[20 : 20 + height, 8 + k * pixels : 8 + k * pixels + width] for k in range(count)])

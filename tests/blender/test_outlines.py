@@ -105,8 +105,8 @@ def test_as_a_layer_it_leaves_no_ghost(edited):
 
 
 @pytest.fixture
-def chosen(bpy, edited):
-    """An outline that is drawn at two frames, the second time elsewhere; its region and strip."""
+def chosen(edited):
+    """Makes an effect with an outline that is drawn at these frames, to be edited."""
 
     def make(*args, **fields):
         strip, effect = edited(region(*args, **fields))
@@ -151,10 +151,12 @@ def test_the_next_drawing_needed(bpy, chosen):
     frame, confidence = outline_drawings.next_needed(scene, effect, strip, 0)
     assert scene.frame_current == frame in (6, 7, 8)
     assert confidence < 0.75
+    effect.regions[0].between = "STRAIGHT"
+    with pytest.raises(RuntimeError, match="a linear outline is not tracked"):
+        bpy.ops.shutter.outline_needed()
 
 
 def test_one_drawing_says_where_the_next_is_needed(bpy, chosen, monkeypatch):
-    """In the middle of the least confident frames, not beside the drawing."""
     strip, effect = chosen(1)
     assert bpy.ops.shutter.outline_needed() in ({"FINISHED"}, {"CANCELLED"})
     sure = [1.0, 0.9, 0.9, 0.7, 0.7, 0.6, 0.4, 0.2, 0.0, 0.0, 0.0, None]
@@ -162,12 +164,6 @@ def test_one_drawing_says_where_the_next_is_needed(bpy, chosen, monkeypatch):
     assert outline_drawings.next_needed(strip.id_data, effect, strip, 0) == (11, 0.0)
     sure[6:] = [0.9] * 6
     assert outline_drawings.next_needed(strip.id_data, effect, strip, 0) == (6, 0.6)
-
-
-def test_what_is_needed_of_straight_ones(bpy, chosen):
-    chosen(1, 9, between="straight")
-    with pytest.raises(RuntimeError, match="a linear outline is not tracked"):
-        bpy.ops.shutter.outline_needed()
 
 
 @pytest.mark.parametrize(("frames", "fields"), [((1,), {}), ((1, 9), {}), ((1, 9), {"between": "straight"})])
@@ -204,10 +200,8 @@ def test_outline_it(bpy, edited, kind, strokes):
     effect.active_shutter = 1
     strip.id_data.frame_set(5)
     assert bpy.ops.shutter.outline_it() == {"FINISHED"}
-    assert (effect.regions[0].kind, effect.regions[0].motion) == (
-        "OUTLINE",
-        "LOCATION" if kind != "outline" else "SCALE",
-    )
+    assert effect.regions[0].kind == "OUTLINE"
+    assert effect.regions[0].motion == ("SCALE" if kind == "outline" else "LOCATION")
     assert 5 in drawn_at(effect)
     found = outlines.coverage(outline_drawings.curves_now(strip.id_data, effect, strip, 0), WIDTH, HEIGHT) > 0.5
     expected = covered(4) > 0.5
@@ -216,7 +210,6 @@ def test_outline_it(bpy, edited, kind, strokes):
 
 @pytest.mark.parametrize(("word", "levels"), [("PNG", 65535), ("EXR", 1)])
 def test_export(bpy, chosen, tmp_path, word, levels):
-    """A picture for each frame of the strip, by its number, with what the matte shows there; or none."""
     strip, effect = chosen(1, 9)
     expected = {frame: coefficients(strip, effect, frame) for frame in (1, 5, 12)}
     folder = tmp_path / "mattes"
@@ -257,22 +250,17 @@ def moving_mask(bpy):
 
 
 def test_from_a_mask(bpy, chosen, moving_mask):
-    """An outline covers what the mask does, with drawings where its motion changes."""
     strip, effect = chosen(2)
+    bpy.data.masks.new("empty")
+    with pytest.raises(RuntimeError, match='mask "empty" encloses nothing in the strip'):
+        bpy.ops.shutter.outline_from_mask(mask="empty")
+    assert len(effect.regions) == 1
     assert bpy.ops.shutter.outline_from_mask(mask=moving_mask.name) == {"FINISHED"}
     again = effect.regions[-1]
     assert (again.kind, again.between, effect.active_region) == ("OUTLINE", "STRAIGHT", len(effect.regions) - 1)
     effect.regions[0].opacity = 0
     for frame in (2, 4, 7, 12):
         assert np.abs(coefficients(strip, effect, frame) - covered(frame - 1)).mean() < 0.015, frame
-
-
-def test_masks_that_give_no_outline(bpy, chosen):
-    _strip, effect = chosen(1, 9)
-    bpy.data.masks.new("empty")
-    with pytest.raises(RuntimeError, match='mask "empty" encloses nothing in the strip'):
-        bpy.ops.shutter.outline_from_mask(mask="empty")
-    assert len(effect.regions) == 1
 
 
 def test_what_fails_beside_blender_is_told_once(bpy):

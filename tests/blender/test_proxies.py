@@ -3,7 +3,7 @@
 import numpy as np
 import OpenImageIO
 import pytest
-from support import sequencer, write_frames, write_movie
+from support import image_strip, sequencer, write_frames, write_movie
 
 from shutter_addon.blender.data import source_media
 from shutter_addon.blender.data.source_media import proxy_of
@@ -24,15 +24,10 @@ def built(bpy, edit, tmp_path):
     """Sets up a strip, has Blender build its proxies of a half, and gives the strip."""
 
     def strip(kind):
-        strips = edit.sequence_editor.strips
         if kind == "IMAGE":
-            images = strips.new_image("images", str(write_frames(tmp_path / "in", pictures()[:1])), 1, 1)
-            write_frames(tmp_path / "in", pictures())
-            for index in range(2, COUNT + 1):
-                images.elements.append(f"f{index:04d}.png")
-            return images
+            return image_strip(edit, write_frames(tmp_path / "in", pictures()))
         path = write_movie(tmp_path / "movie.mp4", pictures(), "libx264", "yuv420p", 25, {"qp": "10"})
-        return strips.new_movie("movie", str(path), 2, 1)
+        return edit.sequence_editor.strips.new_movie("movie", str(path), 2, 1)
 
     def build(kind):
         bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "edit.blend"))
@@ -64,12 +59,7 @@ def assert_read(edit, strip):
 
 @pytest.mark.parametrize(
     ("kind", "storage", "folder"),
-    [
-        ("MOVIE", "PER_STRIP", ""),
-        ("IMAGE", "PER_STRIP", ""),
-        ("MOVIE", "PROJECT", "//of the project"),
-        ("MOVIE", "PROJECT", ""),
-    ],
+    [("MOVIE", "PER_STRIP", ""), ("IMAGE", "PER_STRIP", ""), ("MOVIE", "PROJECT", "//its"), ("MOVIE", "PROJECT", "")],
 )
 def test_where_blender_puts_them(edit, built, kind, storage, folder):
     edit.sequence_editor.proxy_storage, edit.sequence_editor.proxy_dir = storage, folder

@@ -121,33 +121,25 @@ def test_a_damaged_exr_is_rendered_again(bpy, saved, run, save, tmp_path, codec)
     assert bits(tmp_path / "out", "exr") == whole
 
 
-@pytest.fixture
-def at_frame(bpy):
-    """Has something done after a frame was rendered, before its picture is moved to its place."""
-    handlers = []
-
-    def at(frame, do):
-        handlers.append(bpy.app.handlers.persistent(lambda scene, *_: scene.frame_current == frame and do()))
-        bpy.app.handlers.render_write.append(handlers[-1])
-
-    yield at
-    for handler in handlers:
-        bpy.app.handlers.render_write.remove(handler)
-
-
 @pytest.mark.parametrize("resume", [[], ["--resume"]])
-def test_a_job_of_a_newer_version_ends_an_older_ones_render(bpy, saved, run, at_frame, tmp_path, resume):
+def test_a_job_of_a_newer_version_ends_an_older_ones_render(bpy, saved, run, tmp_path, resume):
     bpy.ops.wm.open_mainfile(filepath=str(saved))
     newer = replace(versions.of_edit(bpy.context.scene), blend="00" * 32)
     out = tmp_path / "out"
-    at_frame(3, lambda: job_file.write(out, newer))
-    refused(run("render", saved, "--output", out, *resume), job_file.NAME, "another version of the .blend file")
+
+    @bpy.app.handlers.persistent
+    def begin_newer(scene, *_):
+        if scene.frame_current == 3:  # it was rendered, and is not yet moved to its place
+            job_file.write(out, newer)
+
+    bpy.app.handlers.render_write.append(begin_newer)
+    done = run("render", saved, "--output", out, *resume)
+    bpy.app.handlers.render_write.remove(begin_newer)
+    refused(done, job_file.NAME, "another version of the .blend file")
     assert sorted(os.listdir(out)) == ["0001.png", "0002.png", job_file.NAME]
 
 
 def test_missing_media_are_those_of_the_frames(bpy, edit, run, save, tmp_path):
-    """Whatever lies in a strip, in a scene or in a material of it, and whichever command asks."""
-
     def image(name):
         made = bpy.data.images.new(name, 4, 4)
         made.source, made.filepath = "FILE", str(tmp_path / name)

@@ -73,11 +73,7 @@ def test_nothing_is_lost(bpy, folder, capfd):
     bpy.ops.wm.open_mainfile(filepath=edit)
     assert lost(folder) == []
     assert "newer version" not in capfd.readouterr().err
-
-
-def test_the_machine_is_not_in_the_files(bpy, folder):
-    """Blender stores where its file browser was."""
-    bpy.ops.wm.open_mainfile(filepath=str(folder / "edit.blend"))
+    # Blender stores where its file browser was: nothing of the machine.
     spaces = (space for screen in bpy.data.screens for area in screen.areas for space in area.spaces)
     browsers = [space.params for space in spaces if space.type == "FILE_BROWSER" and space.params]
     assert {browser.directory for browser in browsers} == {b"//"}

@@ -9,7 +9,7 @@ import time
 import numpy as np
 import pytest
 from made_recipes import made
-from standin import Between, moments, spread
+from standin import Between, moments, moving, spread
 from support import image_strip, picture_of, request, write_frames
 
 from shutter_addon.blender.data import consistency, fcurves, preview_areas, snapshot
@@ -54,10 +54,8 @@ def add(bpy, edit):
     def added(first, bars, smooth=str(STEPS), **options):
         source = image_strip(edit, first, 1, 1, "film")
         strip, effect = add_effect.add_effect(edit, source)
-        edit.render.resolution_x, edit.render.resolution_y = (
-            effect.scene.render.resolution_x,
-            effect.scene.render.resolution_y,
-        )
+        size = effect.scene.render
+        edit.render.resolution_x, edit.render.resolution_y = size.resolution_x, size.resolution_y
         effect.inbetween = smooth
         effect.window = len(bars)
         shutter_edits.add_shutter(effect, "S")
@@ -190,21 +188,10 @@ def test_a_shape_is_spread_over_its_own_time(film, add, edit):
 # How many moments there are
 
 
-def moving(folder, pixels, count=6, size=(320, 180), repeat=1):
-    """A film of a texture that moves to the left, each frame shown so often: its first file."""
-    import cv2
-
-    noise = np.random.default_rng(2).integers(0, 256, (60, 160, 3), dtype=np.uint8)
-    texture = cv2.resize(noise, None, fx=4, fy=4, interpolation=cv2.INTER_CUBIC)
-    width, height = size
-    frames = [texture[20 : 20 + height, 8 + k * pixels : 8 + k * pixels + width] for k in range(count)]
-    return write_frames(folder, np.stack(frames).repeat(repeat, 0))
-
-
 @pytest.mark.parametrize(("pixels", "steps"), [(0, 1), (1, 1), (3, 2), (7, 4), (20, 16)])
 def test_automatic_takes_as_many_as_the_fastest_motion_needs(add, edit, tmp_path, pixels, steps):
     """At this height, two pixels look smooth."""
-    _source, strip, effect = add(moving(tmp_path / "film", pixels), np.ones(4), "AUTO")
+    _source, strip, effect = add(write_frames(tmp_path / "film", moving(pixels)), np.ones(4), "AUTO")
     found = request(edit, effect, strip, 2)
     assert found.renderer.source.step == steps
     assert found.state.bars.shape == (1, 4 * steps)
@@ -214,7 +201,7 @@ def test_automatic_takes_as_many_as_the_fastest_motion_needs(add, edit, tmp_path
 @pytest.mark.parametrize(("smooth", "skips"), [("2", True), ("AUTO", True), ("AUTO", False)])
 def test_repeated_frames_are_skipped(add, edit, tmp_path, smooth, skips):
     """Those that are shown twice are moments half-way then, and of Automatic's motion there is half."""
-    first = moving(tmp_path / "film", 5, repeat=2)
+    first = write_frames(tmp_path / "film", moving(5).repeat(2, 0))
     _source, strip, effect = add(first, [1, 0], smooth, skip_repeats=skips, stop_at_cuts=False)
     picture = picture_of(effect.scene, 2)
     asked = request(edit, effect, strip, 2)
@@ -233,7 +220,7 @@ def test_motion_is_measured_once(add, edit, tmp_path, monkeypatch):
     monkeypatch.setattr(
         smooth, "steps_for", lambda *given, **more: asked.append((*given[1:], more)) or steps_for(*given, **more)
     )
-    _source, strip, effect = add(moving(tmp_path / "film", 5), np.ones(4), "AUTO")
+    _source, strip, effect = add(write_frames(tmp_path / "film", moving(5)), np.ones(4), "AUTO")
     for position in ("START", "CENTER", "END"):
         effect.position = position
         request(edit, effect, strip, 2)
@@ -242,24 +229,6 @@ def test_motion_is_measured_once(add, edit, tmp_path, monkeypatch):
 
 
 # Previews
-
-
-def test_a_preview_is_plain_while_it_plays_and_smooth_when_it_stands(film, add, edit, bpy, monkeypatch, same_pixels):
-    """It never waits for flow, and nobody has to click."""
-    first, frames = film
-    bars = np.ones(3)
-    _source, strip, effect = add(first, bars)
-    look = preview_areas.Look(scale=1.0, proxy=None, is_plain=True)
-    drawing = sessions.of_drawing()
-    taken = snapshot.take(edit, effect, strip, (2,))
-    plain = light.to_encoded(frames[[4, 8, 12]].mean(axis=0)) * 255
-    for is_playing in (True, False, True):
-        # No preview plays without a window.
-        monkeypatch.setattr(previews, "_is_playing", lambda _context, is_playing=is_playing: is_playing)
-        asked = drawing.request(taken, 2, previews._detail(bpy.context, look))  # as a preview asks, which is drawn
-        picture = light.to_encoded(drawing.session.picture(asked)[..., :3]) * 255
-        assert (asked.state.options.step == 1) == is_playing
-        same_pixels(picture, plain if is_playing else shown(frames, around(4, bars), bars), 1)
 
 
 def test_a_still_preview_is_plain_until_its_moments_are_there(film, add, edit, bpy, monkeypatch, same_pixels):
@@ -301,9 +270,12 @@ def test_a_still_preview_is_plain_until_its_moments_are_there(film, add, edit, b
     gate.set()
 
 
-def test_a_dragged_playhead_waits_for_no_flow(bpy, monkeypatch):
+def test_a_dragged_playhead_and_a_preview_that_plays_wait_for_no_flow(bpy, monkeypatch):
     look = preview_areas.Look(scale=0.5, proxy=None, is_plain=True)
     assert previews._detail(bpy.context, look).smooth  # as a preview asks, which is drawn
+    with monkeypatch.context() as playing:
+        playing.setattr(previews, "_is_playing", lambda _context: True)  # no preview plays without a window
+        assert not previews._detail(bpy.context, look).smooth  # likewise
     monkeypatch.setattr(render_job, "operators_running", lambda: {"ANIM_OT_change_frame"})
     assert not previews._detail(bpy.context, look).smooth  # likewise
     monkeypatch.setattr(previews.looking, "late_until", 0.0)
@@ -326,35 +298,22 @@ def counted(bars, steps, position):
     return [sum(bars[k : k + steps]) / steps for k in range(0, len(bars), steps)]
 
 
-@pytest.fixture
-def older(bpy, effect, tmp_path):
-    """Has an effect be one of a file of format 1, whose bars count moments; opens that file."""
-
-    def opened(steps, position, window):
-        scene = effect.id_data
-        effect.position, effect.window = position, window
-        rng = np.random.default_rng(5)
-        bars = [rng.random(window) for _ in range(3)]
-        bar_edits.set_bars(effect.shutters[1], bars[1])
-        for frame, weights in ((1, bars[0]), (9, bars[2])):
-            scene.frame_set(frame)
-            bar_edits.set_bars(effect.shutters[0], weights)
-            bar_edits.key_bars(effect, 0)
-        effect.inbetween = str(steps)
-        scene.virtual_shutter.format = 1
-        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "older.blend"))
-        bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "older.blend"))
-        return bpy.context.scene, bars
-
-    return opened
-
-
 @pytest.mark.parametrize(
     ("steps", "window", "position"), [(2, 8, "START"), (8, 12, "CENTER"), (16, 33, "END"), (4, 1, "END")]
 )
-def test_bars_of_format_1_count_filmed_frames_now(older, steps, window, position):
+def test_bars_of_format_1_count_filmed_frames_now(bpy, effect, tmp_path, steps, window, position):
     """Keyed ones, too; recipes of the first version are read alike."""
-    scene, bars = older(steps, position, window)
+    scene, bars = effect.id_data, np.random.default_rng(5).random((3, window))
+    effect.position, effect.window = position, window
+    bar_edits.set_bars(effect.shutters[1], bars[1])
+    for frame, weights in ((1, bars[0]), (9, bars[2])):
+        scene.frame_set(frame)
+        bar_edits.set_bars(effect.shutters[0], weights)
+        bar_edits.key_bars(effect, 0)
+    effect.inbetween, scene.virtual_shutter.format = str(steps), 1
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "older.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "older.blend"))
+    scene = bpy.context.scene
     effect = scene.virtual_shutter.effects[0]
     count = -(-window // steps)
     assert scene.virtual_shutter.format == 2
@@ -366,24 +325,19 @@ def test_bars_of_format_1_count_filmed_frames_now(older, steps, window, position
         assert snapshot.bars_at(scene, effect, 0, frame) == pytest.approx(expected, abs=1e-6)
     paths = {curve.data_path.rpartition("bars[")[2] for curve in fcurves.curves_under(scene, effect.path_from_id())}
     assert paths == {f"{bar}].weight" for bar in range(count)}
-    stored = [float(np.float32(bar)) for bar in bars[1]]
+    stored = bars[1].astype(np.float32).tolist()
     read = made(window, [{"name": "A", "bars": stored}], inbetween=steps, position=position.lower(), version=1)
     options = read.options.at(1)
     assert (options.window, options.skip_repeats) == (count, False)
     assert consistency.bars(effect.shutters[1]) == pytest.approx(read.shutters[0].bars.channel.at(1), abs=1e-6)
 
 
-TOLD = 'shutter "Long": bars {first} to {last} of the older file are one filmed frame now, and expose other moments'
-
-
-@pytest.mark.parametrize("kept", [True, False])
-def test_an_imported_recipe_of_version_1_tells_what_it_lost(bpy, effect, tmp_path, capfd, kept):
-    bars = [1, 0, 0, 0] if kept else [1, 1, 1, 0]
-    data = {"version": 1, "window": 4, "inbetween": 4, "shutters": [{"name": "Long", "bars": bars}]}
+def test_an_imported_recipe_of_version_1_tells_what_it_lost(bpy, effect, tmp_path, capfd):
+    data = {"version": 1, "window": 4, "inbetween": 4, "shutters": [{"name": "Long", "bars": [1, 1, 1, 0]}]}
     (tmp_path / "r.json").write_text(json.dumps(data))
     assert bpy.ops.shutter.recipe_import(filepath=str(tmp_path / "r.json")) == {"FINISHED"}
-    said = "".join(capfd.readouterr())
-    assert (f"Warning: {TOLD.format(first=1, last=4)}" in said) == (not kept)
+    told = 'Warning: shutter "Long": bars 1 to 4 of the older file are one filmed frame now, and expose other moments'
+    assert told in "".join(capfd.readouterr())
 
 
 def test_vectors_are_kept_beside_the_file(bpy, filmed, add, edit, tmp_path):

@@ -27,9 +27,8 @@ def found(bpy, edit, tmp_path):
         bar_edits.paint(effect, 1, bars, key=True)
     region = region_edits.add_region(effect, effect.shutters[1])
     for frame in (1, 12):
-        stroke = annotations.layer_of(effect, region).frames.new(frame).strokes.new()
-        stroke.points.add(2)
-        stroke.points.foreach_set("co", [-5.0 - frame, 2, 0, 8, 3, 0])
+        drawing = annotations.layer_of(effect, region).frames.new(frame)
+        annotations.add_stroke(drawing, np.array([(-5.0 - frame, 2), (8, 3)]))
         region.location[0] = frame / 100
         region.keyframe_insert("location", frame=frame)
         effect.position = "START" if frame == 1 else "END"
@@ -57,7 +56,6 @@ def test_it_holds_no_blender_data_and_does_not_change(found):
 
 
 def test_many_frames_are_those_of_each(found):
-    """However many are sampled at once, and in whatever way bars are interpolated."""
     for interpolation in ("DISPLACEMENT", "VALUE"):
         found[1].interpolation = interpolation
         single = [snapshot.take(*found, (frame,)).effect.at(frame).key for frame in FRAMES]

@@ -4,16 +4,7 @@ import ctypes
 
 import numpy as np
 import pytest
-from support import (
-    effect_of,
-    image_strip,
-    noise_film,
-    recipe,
-    request,
-    sequencer,
-    write_frames,
-    write_movie,
-)
+from support import effect_of, image_strip, noise_film, recipe, request, sequencer, write_frames, write_movie
 
 from shutter_addon.blender.data import annotations, strips
 from shutter_addon.blender.rendering import job_snapshots as snapshots
@@ -76,8 +67,10 @@ def check(edit, render, effect_strips, frames):
     assert len({p[0, 0, 0] for p in plain.values()}) > len(frames) / 20, "the plain strip shows several frames"
 
 
-def test_still_frames_beyond_the_content(edit, render, effect_on, movie):
+@pytest.mark.parametrize("percentage", [100, 50])
+def test_still_frames_beyond_the_content(edit, render, effect_on, movie, percentage):
     source = new_movie(edit, movie, start=10)
+    edit.render.resolution_percentage = percentage
     source.left_handle, source.right_handle = 1, 90
     strip, _ = effect_on(source)
     check(edit, render, [strip], [1, 5, 9, 10, 11, 40, 69, 70, 71, 89])
@@ -230,12 +223,6 @@ def test_a_copied_edit_has_effects_of_its_own(bpy, edit, render, effect_on, movi
     own.shutters[0].bars[2].weight, own.shutters[0].bars[0].weight = 0, 1
     assert render(copy, [5])[5][20, 0, 0] == pytest.approx(4 * 4 + 5, abs=1)
     assert np.array_equal(render(edit, [5])[5], before)
-
-
-def test_half_resolution(edit, render, effect_on, movie):
-    strip, _ = effect_on(new_movie(edit, movie))
-    edit.render.resolution_percentage = 50
-    check(edit, render, [strip], [1, 20, 40, 60])
 
 
 def test_a_hard_cut_changes_no_picture(bpy, edit, render, tmp_path):

@@ -28,9 +28,8 @@ def ground(index):
     """A checkered disc that walks over a plain ground."""
     y, x = np.indices((HEIGHT, WIDTH))
     frame = np.repeat((70 + x // 8)[..., None], 3, axis=2)
-    frame[disc(index)] = (np.stack([220 - 60 * ((x - 5 * index) // 6 + y // 6) % 2] * 3, 2) * (1, 0.4, 0.3))[
-        disc(index)
-    ]
+    checks = np.stack([220 - 60 * ((x - 5 * index) // 6 + y // 6) % 2] * 3, 2) * (1, 0.4, 0.3)
+    frame[disc(index)] = checks[disc(index)]
     return frame.astype(np.uint8)
 
 
@@ -126,7 +125,6 @@ def test_recipe_and_back(edited, tmp_path):
 
 
 def test_as_an_outline(bpy, edited):
-    """It is drawn where the subject had a stroke; removed, nothing of it stays in the annotation."""
     strip, effect = edited()
     assert bpy.ops.shutter.subject_outline() == {"FINISHED"}
     region = effect.regions[0]
@@ -178,9 +176,7 @@ def test_nothing_under_the_stroke(bpy, edited, capfd):
     assert effect.regions[0].kind == "LINE"
 
 
-@pytest.mark.parametrize(
-    ("content", "message"), [(None, "cannot be read"), (b"not a model", "is damaged, or no ONNX model")]
-)
+@pytest.mark.parametrize(("content", "message"), [(None, "cannot be read"), (b"not a model", "or no ONNX model")])
 def test_without_a_model(bpy, edited, tmp_path, monkeypatch, content, message):
     """One sentence, when it is asked for, rendered, and checked."""
     path = tmp_path / "other.onnx"

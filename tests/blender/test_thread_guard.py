@@ -14,7 +14,9 @@ def test_a_render_works_on_threads_that_touch_no_data(bpy, edit, render, effect)
     assert not thread_guard.faults()
 
 
-def test_data_on_a_thread_are_found(bpy, effect):
+def test_data_and_calls_on_a_thread_are_found(bpy, effect):
+    import gpu
+
     selection.active_shutter(effect)
     assert not thread_guard.faults()
     threads.start(selection.active_shutter, effect).result()
@@ -23,12 +25,7 @@ def test_data_on_a_thread_are_found(bpy, effect):
     assert any("active_shutter has effect" in fault for fault in found)
     threads.start(selection.active, bpy.context).exception()
     assert any("has context" in fault for fault in thread_guard.faults())
-
-
-def test_calls_of_blender_on_a_thread_are_found(bpy):
-    """From modules that never import it, too."""
-    import gpu
-
+    # And calls from modules that never import Blender.
     timers, texts, scenes = bpy.app.timers, bpy.app.translations, bpy.data.scenes
     for function in (timers.is_registered, texts.pgettext_rpt, scenes.get, gpu.types.GPUTexture):
         threads.start(session.broken_off, stopping.never, function, "Shutter").exception()

@@ -14,6 +14,12 @@ from shutter_addon.core.frames.retiming import RetimingKey, are_retiming_keys
 from shutter_addon.core.model.clip import Clip
 
 
+@pytest.fixture
+def source(edit, tmp_path):
+    """A strip of twenty images."""
+    return image_strip(edit, write_frames(tmp_path / "in", np.zeros((20, 8, 8, 3), dtype=np.uint8)))
+
+
 @pytest.mark.parametrize("pair", [(29.0, math.nan), (math.nan, 0.5), (math.inf, 0.5), (1e300, 0.5), (-1.0, 0.5)])
 def test_keys_that_cannot_be(bpy, pair):
     good = [(0.0, 0.0), (7.2, 0.5), (7.2, 0.5), (51.0, 1.0)]
@@ -22,11 +28,8 @@ def test_keys_that_cannot_be(bpy, pair):
 
 
 @pytest.mark.parametrize("keys", [2, 3])
-def test_what_cannot_be_read_is_shown_at_an_even_speed(bpy, edit, tmp_path, monkeypatch, keys):
+def test_what_cannot_be_read_is_shown_at_an_even_speed(edit, source, monkeypatch, keys):
     """In a version of Blender whose layout is not known: the film is rendered, and that is said once."""
-    first = write_frames(tmp_path / "in", np.zeros((20, 8, 8, 3), dtype=np.uint8))
-    source = image_strip(edit, first)
-    source.right_handle = 21
     for frame in (1, 11)[: keys - 1]:
         source.retiming_keys.add(timeline_frame=frame)
     source.retiming_keys[-1].timeline_frame = 52
@@ -51,20 +54,16 @@ def test_what_cannot_be_read_is_shown_at_an_even_speed(bpy, edit, tmp_path, monk
     assert any(said in note for note in notes)
 
 
-def test_other_memory_than_the_strips(bpy, edit, tmp_path):
+def test_other_memory_than_the_strips(source):
     """As if its record lay elsewhere than Blender says: no address in it is followed."""
-    first = write_frames(tmp_path / "in", np.zeros((1, 8, 8, 3), dtype=np.uint8))
-    source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
     assert source_media.retiming_keys(source) == ()
     moved = Like(source, as_pointer=lambda: source.as_pointer() + 8)
     assert source_media.retiming_keys(moved) is None
 
 
-def test_a_still_of_a_million_frames_takes_no_time(bpy, edit, tmp_path):
+def test_a_still_of_a_million_frames_takes_no_time(source):
     """Blender shows one frame of it all along; where that began is not sought frame by frame."""
-    first = write_frames(tmp_path / "in", np.zeros((1, 8, 8, 3), dtype=np.uint8))
-    source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
     source.right_handle = 1_000_000
     start = time.perf_counter()
-    assert Clip(width=8, height=8, count=1, timing=source_media.timing_of(source)).shown(999_999).source_frame == 0
+    assert Clip(width=8, height=8, count=20, timing=source_media.timing_of(source)).shown(999_999).source_frame == 19
     assert time.perf_counter() - start < 1

@@ -87,10 +87,8 @@ def test_every_key_is_kept_on_demand_and_only_in_those_frames(track, film, tmp_p
     assert (found[0].ease, found[0].location, found[-1].location) == ("bezier", [0.5, 0.5], [0.5, 0.5])
     assert {key.scale for key in found} == {1.0}
     # at frame 6, and at those that were not tracked, it is where the keys had put it
-    before, after = (
-        recipe_file.load(tmp_path / name).for_picture(WIDTH / HEIGHT).regions[1].moves.location
-        for name in ("recipe.json", "t.json")
-    )
+    effects = (recipe_file.load(tmp_path / name).for_picture(WIDTH / HEIGHT) for name in ("recipe.json", "t.json"))
+    before, after = (effect.regions[1].moves.location for effect in effects)
     for frame in (1, 2, 3, 6, 9, 10, 11, 12):
         assert after.at(frame) == pytest.approx(before.at(frame)), frame
 
@@ -122,10 +120,8 @@ def test_between_filmed_frames_it_goes_straight(track, film, tmp_path, subject, 
         given["regions"] = []
     assert track(film, *options, recipe=given) == (0, "")
     effect = recipe_file.load(tmp_path / "t.json").for_picture(WIDTH / HEIGHT)
-    places = {}
-    for frame in range(1, 46):
-        moving = effect.regions[1] if subject == "region" else effect.camera
-        places[frame] = np.add(moving.placement(frame).location, moving.centre(frame))
+    moving = effect.regions[1] if subject == "region" else effect.camera
+    places = {frame: np.add(moving.placement(frame).location, moving.centre(frame)) for frame in range(1, 46)}
     for frame, place in places.items():
         assert place - places[start] == pytest.approx(expected(frame / 4, start / 4), abs=0.3 / WIDTH), frame
 
@@ -143,7 +139,6 @@ def test_what_is_shown_twice_is_tracked_once(track, film, tmp_path):
 
 @pytest.mark.parametrize("between", ["carried", "straight"])
 def test_an_outline_gets_keys_of_what_it_encloses(track, film, tmp_path, between):
-    """They say how that moves; its drawings stay where they are."""
     box = [[[0.35, 0.35], [0.65, 0.35], [0.65, 0.65], [0.35, 0.65]]]
     given = plain(kind="outline", strokes=box, between=between)
     options = ("--region", "cross", "--frame", 5, "--motion", "location", "--all-keys")
@@ -211,7 +206,6 @@ def test_bad_input_is_one_sentence_and_writes_nothing(track, film, tmp_path):
 
 
 def test_the_camera_gets_keys_that_a_shutter_follows(track, film, tmp_path):
-    """The wall goes by, and a region has nothing to do with it."""
     given = plain(strokes=[[[0.5, 0.5]]]) | {"camera": [{"frame": 20, "location": [0.5, 0]}]}
     options = ("--camera", "--frame", 5, "--output", tmp_path / "t.json", "--report", tmp_path / "r.json")
     assert track(film, *options, recipe=given) == (0, "")

@@ -123,17 +123,3 @@ def test_tracked_again_the_made_keys_are_replaced_and_the_editors_stay(bpy, edit
     edit.frame_set(11)
     track(bpy)
     assert [key[:3] for key in keys(bpy, "opacity")[0]] == [(13, 0.5, "KEYFRAME")]
-
-
-def test_a_subject_that_stays_has_no_keys(bpy, edit, tmp_path):
-    drawn(edit, new_source(edit, write_frames(tmp_path / "all", [picture(i) for i in range(COUNT)])))
-    track(bpy)
-    assert not keys(bpy, "opacity")
-
-
-def test_a_locked_curve_is_refused(bpy, between_cuts):
-    between_cuts.keyframe_insert("opacity", frame=19)
-    (curve,) = fcurves.curves_under(active(bpy)[0], f"{between_cuts.path_from_id()}.opacity")
-    curve.lock = True
-    with pytest.raises(RuntimeError, match='the F-curve of "Opacity" is locked'):
-        call(bpy, "track")

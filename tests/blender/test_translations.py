@@ -5,28 +5,23 @@ import string
 from pathlib import Path
 
 import messages
-import pytest
 
 from shutter_addon.blender.interface.translations import LANGUAGES
 
+GERMAN = LANGUAGES["de_DE"]
 TOLD = Path(__file__).parent / "told.py"
 
 
-@pytest.fixture(scope="module")
-def german(bpy):
-    return LANGUAGES["de_DE"]
-
-
-def test_everything_that_is_said_has_a_german_text_and_nothing_else_has(bpy, german):
+def test_everything_that_is_said_has_a_german_text_and_nothing_else_has(bpy):
     shown = messages.of_classes() | messages.of_presets() | messages.of_sources()
     said = shown | messages.of_core() | messages.of_media()
     said = {message for message in said if message[0] != bpy.app.translations.contexts.no_translation}
-    assert said - german.keys() == set(), "not translated"
-    assert german.keys() - said == set(), "no longer said"
+    assert said - GERMAN.keys() == set(), "not translated"
+    assert GERMAN.keys() - said == set(), "no longer said"
 
 
-def test_no_text_is_empty_and_placeholders_agree(german):
-    for (_context, message), text in german.items():
+def test_no_text_is_empty_and_placeholders_agree():
+    for (_context, message), text in GERMAN.items():
         assert text.strip() == text != "", message
         assert _placeholders(text) == _placeholders(message), message
 

@@ -12,10 +12,8 @@ from shutter_addon.core.model.frame_state import FrameState, Options
 def exposed(moment, index, direction, shot):
     """By shutters: how much of each frame they expose."""
     frames = windows.indices(moment.options, index, shot, direction)
-    return [
-        {f: float(bars[frames == f].sum()) for f in set(frames.tolist()) if bars[frames == f].any()}
-        for bars in moment.bars
-    ]
+    seen = set(frames.tolist())
+    return [{f: float(bars[frames == f].sum()) for f in seen if bars[frames == f].any()} for bars in moment.bars]
 
 
 def sliding(bars, **options):

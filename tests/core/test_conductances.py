@@ -39,15 +39,12 @@ def test_conductances_are_those_of_the_definition(strength):
 def test_between_the_middles_of_larger_cells_resistances_are_linear(side):
     height, width = 5 * side - 1, 7 * side - side // 2
     guide = noise(5, 7)
-    cells, pixels = by_hand(guide, 1.0), np.empty((height, width))
-    for y, x in np.ndindex(pixels.shape):
-        place = [np.clip((n + 0.5) / side - 0.5, 0, last) for n, last in ((y, 4), (x, 6))]
-        (j, v), (i, u) = (
-            (int(min(n, last - 1)), n - int(min(n, last - 1))) for n, last in zip(place, (4, 6), strict=True)
-        )
-        pixels[y, x] = (1 - v) * ((1 - u) * cells[j, i] + u * cells[j, i + 1]) + v * (
-            (1 - u) * cells[j + 1, i] + u * cells[j + 1, i + 1]
-        )
+
+    def widened(rows, count):
+        places = (np.arange(count) + 0.5) / side - 0.5
+        return np.array([np.interp(places, np.arange(len(row)), row) for row in rows])
+
+    pixels = widened(widened(by_hand(guide, 1.0), width).T, height).T
     right, down = conductances(guide, 1.0, (height, width))
     np.testing.assert_allclose(1 / right, (pixels[:, 1:] + pixels[:, :-1]) / 2, rtol=0, atol=1e-3)
     np.testing.assert_allclose(1 / down, (pixels[1:] + pixels[:-1]) / 2, rtol=0, atol=1e-3)
@@ -62,5 +59,4 @@ def test_alpha_does_not_count():
 @pytest.mark.parametrize("size", [(1, 1), (1, 4), (4, 1)])
 def test_pictures_of_one_row_or_column(size):
     right, down = conductances(np.zeros((*size, 3)), 1.0, size)
-    assert right.shape == (size[0], size[1] - 1)
-    assert down.shape == (size[0] - 1, size[1])
+    assert (right.shape, down.shape) == ((size[0], size[1] - 1), (size[0] - 1, size[1]))

@@ -36,31 +36,20 @@ def keyed(first, last) -> Keys:
     return Keys((1.0, 5.0), tuple(map(np.array, (first, last))), ("linear", "linear"))
 
 
-def changed(**channels) -> effect.Effect:
+def changed(drawn=(1.0,), placement=None, **channels) -> effect.Effect:
     """An effect of a shutter, a scribble and a matte, all still but for these."""
-    options, edge_aware, bars = (
-        channels.pop(name, still)
-        for name, still in (("options", Constant(Options(4))), ("edge_aware", Constant(0)), ("bars", Constant(FIRST)))
-    )
-    strokes, placement = ([np.array([[0.1, 0.2], [0.5, 0.9]])], [np.zeros((2, 2))]), channels.pop("placement", None)
-    frames = channels.pop("drawn", (1.0,))
-    drawings = effect.Drawings("Face", frames, strokes[: len(frames)], ("linear",) * len(frames), 1.0, placement)
-    numbers = {name: channels.pop(name) for name in ("location", "rotation", "scale") if name in channels}
-    width = channels.pop("width", Constant(0.1))
-    ramp = Constant(mattes.Ramp("linear", (0, 0), 0.0, 1.0))
-    matte = {"content": ramp, "opacity": Constant(1.0), "feather": Constant(0.0)} | channels
-    regions = (
-        effect.Region(moves=effect.Moves(**numbers), shutter=0, kind="line", width=width, drawings=drawings),
-        effect.MatteRegion(moves=effect.Moves(), shutter=0, **matte),
-    )
-    return effect.Effect((effect.Shutter(name="Sharp", bars=Bars(bars)),), regions, options, edge_aware=edge_aware)
-
-
-def test_bars_that_are_closed_are_told_with_their_frame():
-    closed = changed(bars=Constant(0 * FIRST))
-    for frame in (1, 3):
-        with pytest.raises(EffectError, match=f"at frame {frame}: all bars are zero"):
-            closed.at(frame)
+    ramp = mattes.Ramp("linear", (0, 0), 0.0, 1.0)
+    still = {"options": Options(4), "edge_aware": 0, "bars": FIRST, "width": 0.1}
+    still |= {"content": ramp, "opacity": 1.0, "feather": 0.0}
+    each = {name: Constant(value) for name, value in still.items()} | channels
+    strokes = [np.array([[0.1, 0.2], [0.5, 0.9]])], [np.zeros((2, 2))]
+    drawings = effect.Drawings("Face", drawn, strokes[: len(drawn)], ("linear",) * len(drawn), 1.0, placement)
+    moves = effect.Moves(**{name: each[name] for name in ("location", "rotation", "scale") if name in each})
+    line = effect.Region(moves=moves, shutter=0, kind="line", width=each["width"], drawings=drawings)
+    matte = {name: each[name] for name in ("content", "opacity", "feather")}
+    regions = line, effect.MatteRegion(moves=effect.Moves(), shutter=0, **matte)
+    shutter = effect.Shutter(name="Sharp", bars=Bars(each["bars"]))
+    return effect.Effect((shutter,), regions, each["options"], edge_aware=each["edge_aware"])
 
 
 @pytest.mark.parametrize(
@@ -117,12 +106,9 @@ def test_strokes_far_off_and_too_many_points_are_refused():
     assert len(made(Bars(Constant(FIRST)), [region(half)]).at(1).shapes) == 1
     with pytest.raises(EffectError, match='region "Second": more than'):
         made(Bars(Constant(FIRST)), [region(half), region(half, name="Second")]).at(1)
+    drawn = effect.Drawings("Outline", (1.0,), (half,), ("linear",), 1.0)
     outline = effect.OutlineRegion(
-        moves=effect.Moves(),
-        name="Outline",
-        shutter=0,
-        content=Constant(None),
-        drawings=effect.Drawings("Outline", (1.0,), (half,), ("linear",), 1.0),
+        moves=effect.Moves(), name="Outline", shutter=0, content=Constant(None), drawings=drawn
     )
     with pytest.raises(EffectError, match='region "Outline": more than'):
         made(Bars(Constant(FIRST)), [region(half), outline]).at(1)

@@ -61,9 +61,8 @@ def test_the_location_alone_is_followed():
 
 def test_smoothing_is_the_weighted_mean_of_the_frames_around():
     jump = [key(10, ease="constant"), key(20, (0.5, 0))]
-    found = shifts(
-        with_way(made(jump, "center"), follow_smooth=3), [19], frame=17, index=16, shown=lambda f: int(f) - 1
-    )
+    source = with_way(made(jump, "center"), follow_smooth=3)
+    found = shifts(source, [19], frame=17, index=16, shown=lambda f: int(f) - 1)
     weights = following.smoothing(3)
     # At frame 20 those from 20 on count, of 17 to 23; at frame 17 the last of 14 to 20.
     assert found[0] == pytest.approx(32 * (weights[3:].sum() - weights[-1]))
@@ -78,7 +77,6 @@ def test_shutters_may_follow_one_region_in_ways_of_their_own():
 
 @pytest.mark.parametrize("keys", [[], STRAIGHT[:1], [key(0, scale=0), key(9, (1, 1))]])
 def test_what_does_not_move_is_nothing_to_follow(keys):
-    """The state is that of an effect which follows nothing."""
     assert state_of(made(keys), 0, 0).key == made(keys, follow=None).for_picture(4 / 3).at(0).key
 
 

@@ -59,8 +59,7 @@ def test_keys_are_equal_for_equal_layers_alone():
 def test_too_many_points_are_refused():
     strokes = [[[0.1, 0.1]] * limits.MAX_POINTS]
     found = effect(LINE | {"layer": True}, LINE | {"name": "Other"})
-    region = dataclasses.replace(
-        found.regions[1], drawings=dataclasses.replace(found.regions[1].drawings, strokes=([np.array(strokes[0])],))
-    )
+    drawings = dataclasses.replace(found.regions[1].drawings, strokes=([np.array(strokes[0])],))
+    region = dataclasses.replace(found.regions[1], drawings=drawings)
     with pytest.raises(EffectError, match="more than"):
         layers(dataclasses.replace(found, regions=(found.regions[0], region)))

@@ -49,9 +49,7 @@ def reference(values, width, height):
 def test_fitted(size, picture):
     values = noise(*size)
     result = fitted(values, *picture)
-    assert result.dtype == np.float32
-    assert result.flags.c_contiguous
-    assert result.shape == picture[::-1]
+    assert (result.dtype, result.shape, result.flags.c_contiguous) == (np.float32, picture[::-1], True)
     assert np.abs(result - reference(values, *picture)).max() < 1e-5
 
 

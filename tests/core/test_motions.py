@@ -80,9 +80,7 @@ def test_thinned_keys_lie_within_the_tolerance(seed, count, tolerance, kept):
     random = np.random.default_rng(seed)
     steps = np.cumsum(random.normal(0, (0.003, 0.003, 1, 0.004), (count, 4)), axis=0)
     frames = sorted(random.choice(80, count, replace=False).tolist())
-    track = {
-        n: Placement((x, y), rotation, 1 + scale) for n, (x, y, rotation, scale) in zip(frames, steps, strict=True)
-    }
+    track = {n: Placement((x, y), turn, 1 + grown) for n, (x, y, turn, grown) in zip(frames, steps, strict=True)}
     offsets, size = random.uniform(-0.2, 0.2, (50, 2)), (640, 360)
     keys = motions.thinned(track, offsets, size, kept, tolerance)
     assert {frames[0], frames[-1], *kept & set(frames)} <= set(keys) <= set(frames)

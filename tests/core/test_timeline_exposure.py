@@ -48,8 +48,7 @@ def test_a_freeze_is_the_shown_frame(position):
     st.sampled_from([1, 2, 4]),
     st.sampled_from([1, -1]),
 )
-def test_whatever_the_speed_is(bars, earlier, later, position, step, direction):
-    """The exposure's light stays, and no bar is negative."""
+def test_whatever_the_speed_is_light_stays_and_no_bar_is_negative(bars, earlier, later, position, step, direction):
     before, after = 100 - direction * earlier, 100 + direction * later
     found = exposed(bars, before=before, after=after, direction=direction, position=position, step=step)
     assert found.sum() == pytest.approx(sum(bars))

@@ -1,21 +1,16 @@
 """An edit, rendered by one process: what every farm has to make of it, to the bit."""
 
-import json
 import shutil
 import sys
 
 import pytest
-from farm_job import RECIPE, Job, shrink, shutter
+from farm_job import Job, saved_job, shutter
 
 
 @pytest.fixture(scope="session")
 def single(bunny, tmp_path_factory):
     """The edit, rendered by one process and joined."""
-    job = Job(tmp_path_factory.mktemp("single"))
-    footage, recipe = job.folder / "footage.mp4", job.folder / "recipe.json"
-    shrink(bunny, footage)
-    recipe.write_text(json.dumps(RECIPE))
-    shutter("render", footage, "--recipe", recipe, "--save", job.edit)
+    job = saved_job(tmp_path_factory.mktemp("single"), bunny)
     shutter("render", job.edit, "--output", job.pictures)
     shutter("join", job.pictures, "--edit", job.edit, "--output", job.movie)
     return job

@@ -46,9 +46,17 @@ class Job:
 
 
 def shutter(*arguments):
-    subprocess.run(
-        [sys.executable, "-m", "shutter_addon", *map(str, arguments)], check=True, capture_output=True, timeout=120
-    )
+    command = [sys.executable, "-m", "shutter_addon", *map(str, arguments)]
+    subprocess.run(command, check=True, capture_output=True, timeout=120)
+
+
+def saved_job(folder, footage, **changes):
+    """A job whose edit is saved, of the footage's first frames; changes: of the recipe."""
+    job = Job(folder)
+    shrink(footage, folder / "footage.mp4")
+    (folder / "recipe.json").write_text(json.dumps(RECIPE | changes))
+    shutter("render", folder / "footage.mp4", "--recipe", folder / "recipe.json", "--save", job.edit)
+    return job
 
 
 def shrink(source, path):

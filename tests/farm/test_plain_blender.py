@@ -1,44 +1,20 @@
 """What Flamenco's built-in job and its like start: a plain Blender with the extension, on a chunk of a saved edit."""
 
-import json
-import os
 import re
 import shlex
-import subprocess
 
 import numpy as np
 import OpenImageIO
 import pytest
-from farm_job import RECIPE, ROOT, Job, shrink, shutter
+from farm_job import ROOT, saved_job
 
-EXTENSION = "bl_ext.user_default.virtual_shutter"
 CHUNKS = (1, 2), (3, 4)
-
-
-@pytest.fixture(scope="module")
-def blender(real_blender, tmp_path_factory):
-    """Runs a real Blender that has the checkout for an extension."""
-    extensions = tmp_path_factory.mktemp("user") / "extensions" / "user_default"
-    extensions.mkdir(parents=True)
-    (extensions / "virtual_shutter").symlink_to(ROOT)
-    resources = {"BLENDER_USER_RESOURCES": str(extensions.parents[1])}
-
-    def run(*arguments):
-        command = [*real_blender, "--factory-startup", "--addons", EXTENSION, *map(str, arguments)]
-        return subprocess.run(command, env=os.environ | resources, capture_output=True, text=True, timeout=240)
-
-    return run
 
 
 @pytest.fixture(scope="module")
 def plain(bunny, tmp_path_factory):
     """A job without Smooth: the Blender of a distribution may lack OpenCV."""
-    job = Job(tmp_path_factory.mktemp("plain"))
-    footage, recipe = job.folder / "footage.mp4", job.folder / "recipe.json"
-    shrink(bunny, footage)
-    recipe.write_text(json.dumps(RECIPE | {"inbetween": 1}))
-    shutter("render", footage, "--recipe", recipe, "--save", job.edit)
-    return job
+    return saved_job(tmp_path_factory.mktemp("plain"), bunny, inbetween=1)
 
 
 def task(edit, pictures, first, last):
@@ -50,8 +26,7 @@ def task(edit, pictures, first, last):
 
 def levels(path):
     """A picture in 8-bit levels."""
-    image = OpenImageIO.ImageBuf(str(path))
-    return np.round(image.get_pixels(OpenImageIO.FLOAT) * 255)
+    return np.round(OpenImageIO.ImageBuf(str(path)).get_pixels(OpenImageIO.FLOAT) * 255)
 
 
 def test_chunks_have_the_pixels_of_the_command(blender, plain):

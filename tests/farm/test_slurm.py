@@ -131,11 +131,6 @@ def waiting(slurm):
     return [line.split()[0] for line in lines if line.endswith("BeginTime")]
 
 
-def nodes(slurm, name):
-    """Those that ran tasks of a job."""
-    return set(told(slurm, "squeue", "-h", "-r", "-t", "all", "-n", name, "-o", "%N").split())
-
-
 def test_a_killed_task_is_run_again_and_gives_the_bits_of_one_process(slurm, submit, job, single):
     submitted = submit()
     assert submitted.returncode == 0, submitted.stderr
@@ -144,7 +139,8 @@ def test_a_killed_task_is_run_again_and_gives_the_bits_of_one_process(slurm, sub
     # Slurm itself waits for two minutes. A node refuses a task that starts within the second in which it was killed.
     subprocess.run(["scontrol", "update", f"JobId={again}", "StartTime=now+3"], env=slurm, check=True)
     wait(lambda: not told(slurm, "squeue", "-h"))
-    assert nodes(slurm, "edit-frames") == {"n1", "n2"}
+    nodes = told(slurm, "squeue", "-h", "-r", "-t", "all", "-n", "edit-frames", "-o", "%N")
+    assert set(nodes.split()) == {"n1", "n2"}
     logs = {path: path.read_text() for path in job.folder.glob("slurm-*.out")}
     assert len(logs) == CHUNKS + 2, told(slurm, "scontrol", "show", "jobs", "-o")
     assert sum("Killed" in text for text in logs.values()) == 1
