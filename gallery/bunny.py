@@ -7,8 +7,7 @@ from .stills import Panel
 FRAME = 45
 
 
-def still(shots):
-    (shot,) = shots
+def still(shot):
     return stills.sheet(
         stills.row(
             Panel(with_bars(shot), "Scribbles, and the bars of their shutters"),
@@ -19,7 +18,7 @@ def still(shots):
             Panel(shot.coefficients(FRAME), "Mattes"),
             Panel(shot.everywhere(FRAME, "Long"), "The long exposure alone"),
         ),
-        caption=ITEM.caption,
+        caption="Big Buck Bunny, © 2008 Blender Foundation, www.bigbuckbunny.org, CC BY 3.0",
     )
 
 
@@ -37,5 +36,4 @@ ITEM = Item(
     recipes=("bunny.json",),
     frames=(33, 64),
     still=still,
-    caption="Big Buck Bunny, © 2008 Blender Foundation, www.bigbuckbunny.org, CC BY 3.0",
 )

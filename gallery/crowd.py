@@ -7,8 +7,7 @@ from .stills import Panel
 ROAD = slice(155, 440), slice(255, 762)
 
 
-def still(shots):
-    taken, dissolved = shots
+def still(taken, dissolved):
     return stills.sheet(
         stills.row(
             Panel(scribbles(taken, 26), "Regions follow people; her shutter"),
@@ -25,7 +24,7 @@ def still(shots):
             Panel(dissolved.result(14)[ROAD], "one dissolves"),
             Panel(dissolved.result(26)[ROAD], "in a long exposure"),
         ),
-        caption=ITEM.caption,
+        caption="Footage: vtest.avi of OpenCV's samples, Apache-2.0",
     )
 
 
@@ -43,5 +42,4 @@ ITEM = Item(
     recipes=("crowd.json", "crowd-reverse.json"),
     frames=(1, 95),
     still=still,
-    caption="Footage: vtest.avi of OpenCV's samples, Apache-2.0",
 )

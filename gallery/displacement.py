@@ -18,12 +18,6 @@ SHIRTS = ("#e8413c", "#f4b63f", "#fdfdf8", "#39b36b", "#3f6fe0", "#8b4fc4")
 def footage(folder):
     from . import scenes
 
-    return scenes.complete(folder, COUNT) or rendered(folder)
-
-
-def rendered(folder):
-    from . import scenes
-
     scenes.begin("#cfe3f2", strength=0.7)
     scenes.box((40, 30, 0.1), (0, 0, -0.1), scenes.paint("#1f7f92", roughness=0.5))
     buoys = [scenes.paint(color) for color in ("#f7f3e6", "#e8563f")]
@@ -52,7 +46,6 @@ def boat(lane: float, shirt: str) -> None:
 
 
 def oar(hull, side: int) -> None:
-    """An oar, its stroke of 60 frames."""
     from . import scenes
 
     pivot = scenes.empty((0.05, side * 0.12, 0.22), parent=hull)
@@ -61,8 +54,7 @@ def oar(hull, side: int) -> None:
     scenes.box((0.1, 0.2, 0.02), (0, side * 0.52, -0.1), scenes.paint("#f2f2ee"), parent=pivot)
 
 
-def still(shots):
-    displaced, valued = shots
+def still(displaced, valued):
     first, second = (displaced.bars(FRAME, name) for name in ("Now", "Later"))
     mixed = [
         (keyframes.between_bars(first[0], second[0], 0.5, way), (first[1] + second[1]) / 2)
@@ -77,7 +69,7 @@ def still(shots):
             panel(displaced.result(FRAME), mixed[0], "Displacement: the lanes between show times between", "halfway"),
             panel(valued.result(FRAME), mixed[1], "Value: the lanes between show both times", "halfway"),
         ),
-        caption=ITEM.caption,
+        caption="Scribbled are the outer lanes alone; the four between get mixtures of the two shutters",
     )
 
 
@@ -93,5 +85,4 @@ ITEM = Item(
     recipes=("displacement.json", "displacement-value.json"),
     frames=(1, COUNT - LATER),
     still=still,
-    caption="Scribbled are the outer lanes alone; the four between get mixtures of the two shutters",
 )

@@ -7,8 +7,7 @@ from .stills import Panel
 FRAME = 50
 
 
-def still(shots):
-    (shot,) = shots
+def still(shot):
     return stills.sheet(
         stills.row(
             Panel(shot.source(FRAME), "A frame of the footage"),
@@ -18,17 +17,15 @@ def still(shots):
             Panel(shot.result(FRAME), "Their median: the street, without those who pass"),
             Panel(shot.everywhere(FRAME, "Darkest"), "The darkest: where they have been"),
         ),
-        caption=ITEM.caption,
+        caption="Footage: vtest.avi of OpenCV's samples, Apache-2.0",
     )
 
 
 ITEM = Item(
     name="empty_street",
-    figure=None,
     title="the median is the street without those who pass",
     footage=walkers,
     recipes=("empty_street.json",),
     frames=(45, 54),
     still=still,
-    caption="Footage: vtest.avi of OpenCV's samples, Apache-2.0",
 )

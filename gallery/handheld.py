@@ -39,7 +39,6 @@ def steady(folder: Path) -> Path:
 
 
 def exposed(first: Path) -> np.ndarray:
-    """The mean of all frames (h, w, 3) in linear light, scene-linear."""
     with open_source(first) as source:
         return np.mean([source.read(index)[..., :3].astype(np.float32) for index in range(source.count)], axis=0)
 
@@ -73,8 +72,6 @@ def held() -> dict:
 def _render(folder: Path, turned) -> Path:
     from . import scenes
 
-    if first := scenes.complete(folder, COUNT, ".exr"):
-        return first
     scenes.begin("#2a3c6e", 0.8, samples=4, motion_blur=OPEN)
     render = scenes.bpy.context.scene.render
     render.resolution_x, render.resolution_y = (side * 2 // 3 for side in scenes.SIZE)
@@ -154,8 +151,7 @@ def _car(scenes, lane: float, height: float, start: float) -> None:
     scenes.animate(car, COUNT, location=lambda frame: (start + way * SPEED * frame, lane, height))
 
 
-def still(shots):
-    (shot,) = shots
+def still(shot):
     truth = np.clip(light.to_encoded(exposed(steady(shot.footage.parents[1] / "steady"))), 0, 1)
     plain = np.clip(light.to_encoded(exposed(shot.footage)), 0, 1)
     return stills.sheet(
@@ -168,7 +164,6 @@ def still(shots):
 
 ITEM = Item(
     name="handheld",
-    figure=None,
     title="a long exposure held in the hand, as if on a tripod",
     footage=footage,
     recipes=("handheld.json",),

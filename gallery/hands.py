@@ -23,8 +23,6 @@ FINGERS = (
 def footage(folder: Path) -> Path:
     from . import scenes
 
-    if first := scenes.complete(folder, COUNT):
-        return first
     scenes.begin("#b9c4d8", 0.35, samples=3)
     scenes.camera((0, -3.2, 9.5), (0, 0.9, 0), 33)
     scenes.lamp("AREA", 900, (-4, 2.5, 6), size=2.5, color="#ffe9d0")
@@ -47,7 +45,6 @@ def right_turn(frame: float):
 
 
 def left_place(frame: float):
-    """A stride: wide leaps between bass and chord."""
     turn = 2 * pi * frame / 48
     return -2.3 + 0.8 * sin(turn), -1.45, 0.15 - 0.15 * cos(2 * turn)
 
@@ -83,8 +80,7 @@ def _piano(scenes) -> None:
     scenes.box((14, 8, 0.1), (0, -3, -1.0), scenes.paint("#5b3a28"))
 
 
-def still(shots):
-    (shot,) = shots
+def still(shot):
     frame = 19
     return stills.sheet(
         stills.row(

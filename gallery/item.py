@@ -15,7 +15,6 @@ from shutter_addon.core.frames import light
 from shutter_addon.core.model import scribbles
 from shutter_addon.core.model.clip import Clip
 from shutter_addon.core.model.effect import Effect, FileContent, MatteRegion
-from shutter_addon.core.model.frame_state import FrameState
 from shutter_addon.core.model.state_at import state_at
 from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media import open_source
@@ -33,7 +32,6 @@ def bunny(_folder: Path) -> Path:
 
 
 def walkers(_folder: Path) -> Path:
-    """People on a street."""
     return ASSETS / "walkers.mp4"
 
 
@@ -41,22 +39,20 @@ def walkers(_folder: Path) -> Path:
 class Item:
     """A figure of the paper, or one beyond it.
 
-    figure: its number in the paper
     footage: gets a folder for what it renders, returns the source: a movie, or the first file of a sequence
     recipes: names of files beside the module; each becomes a film and a .blend of the same name
     frames: the film's first and last timeline frame
-    still: makes the still, a picture (h, w, 3) of 0 to 1, from the shots, one per recipe
-    caption: a line in small type below the still
+    still: makes the still, a picture (h, w, 3) of 0 to 1, of a shot for each recipe
+    figure: its number in the paper
     """
 
     name: str
-    figure: int | None
     title: str
     footage: Callable[[Path], Path]
     recipes: tuple[str, ...]
     frames: tuple[int, int]
-    still: Callable[[list[Shot]], np.ndarray]
-    caption: str = ""
+    still: Callable[..., np.ndarray]
+    figure: int | None = None
 
 
 @dataclass(frozen=True)
@@ -72,19 +68,17 @@ class Shot:
     first: int
 
     def source(self, frame: int) -> np.ndarray:
-        """A frame of the footage."""
         picture = self._source.read(frame - 1)
         if self._source.transfer == "linear":
             return np.clip(light.to_encoded(picture[..., :3].astype(np.float32)), 0, 1)
         return picture[..., :3] / np.float32(np.iinfo(picture.dtype).max)
 
     def result(self, frame: int) -> np.ndarray:
-        """A frame of the film."""
         return self._film.read(frame - self.first)[..., :3] / np.float32(255)
 
     def everywhere(self, frame: int, shutter: str) -> np.ndarray:
         """The picture if one shutter held everywhere, as in a camera."""
-        picture = self._renderer.picture(Request(frame - 1, self._at(frame).of([self._index(shutter)])))
+        picture = self._renderer.picture(Request(frame - 1, self.effect.at(frame).of([self._index(shutter)])))
         return np.clip(light.to_encoded(picture[..., :3]), 0, 1)
 
     def scribbles(self, frame: int, dim: float = 0.6) -> np.ndarray:
@@ -105,7 +99,7 @@ class Shot:
     def bars(self, frame: int, shutter: str) -> tuple[np.ndarray, np.ndarray]:
         """A shutter's bars (L,) at a frame, and its colour (3,)."""
         index = self._index(shutter)
-        return self._at(frame).bars[index], self._colors[index]
+        return self.effect.at(frame).bars[index], self._colors[index]
 
     @cached_property
     def contents(self) -> Effect:
@@ -134,9 +128,6 @@ class Shot:
 
     def _index(self, shutter: str) -> int:
         return [each.name for each in self.contents.shutters].index(shutter)
-
-    def _at(self, frame: int) -> FrameState:
-        return self.effect.at(frame)
 
     def _matte(self, region: MatteRegion) -> MatteFile:
         """What a matte is read from: its file, or for a ramp of luminance the footage."""

@@ -26,8 +26,6 @@ def footage(folder: Path) -> Path:
     """The pictures, and beside them a folder of their mattes."""
     from . import scenes
 
-    if first := scenes.complete(folder, COUNT):
-        return first
     _begin(scenes)
     scenes.write_matte(folder / "matte", NAME, NAME)
     return scenes.render_frames(folder, COUNT)
@@ -50,7 +48,6 @@ def _turning(scenes, thing, start: float) -> None:
 
 
 def _fair(scenes) -> None:
-    """Grass, tents, trees, and pennants on a line."""
     scenes.box((80, 80, 0.2), (0, 10, -0.1), scenes.paint("#6f9a4c", 0.95))
     scenes.tube((0, 0, -0.05), (0, 0, 0.12), 5.6, scenes.paint("#b9a887", 0.9))
     trunk, leaves = scenes.paint("#4f3a28", 0.9), scenes.paint("#41703c", 0.95)
@@ -61,16 +58,13 @@ def _fair(scenes) -> None:
     for x, color in ((-6.4, "#c9473c"), (7.0, "#2f8f84")):
         _tent(scenes, x, color)
     for k in range(26):
-        x = -10 + 0.8 * k
-        color = tuple(PLANES.values())[k % 5]
+        x, color = -10 + 0.8 * k, tuple(PLANES.values())[k % 5]
         sag = 0.045 * ((k % 9) - 4) ** 2
-        scenes.plate(
-            [(x, 5.1 + sag), (x + 0.5, 5.1 + sag), (x + 0.25, 4.5 + sag)], 0.02, (0, 7, 0), scenes.paint(color)
-        )
+        pennant = [(x, 5.1 + sag), (x + 0.5, 5.1 + sag), (x + 0.25, 4.5 + sag)]
+        scenes.plate(pennant, 0.02, (0, 7, 0), scenes.paint(color))
 
 
 def _tent(scenes, x: float, color: str) -> None:
-    """Striped all around."""
     colors = scenes.paint(color, 0.9), scenes.paint("#f4ecda", 0.9)
     count, y = 20, 8.0
     ring = [(2.2 * cos(2 * pi * k / count), 2.2 * sin(2 * pi * k / count)) for k in range(count + 1)]
@@ -119,14 +113,8 @@ def _plane(scenes, name: str, color: str, start: float) -> None:
     scenes.ball(0.085, (1.07, 0, 0), paint, plane)
     scenes.ball((0.13, 0.13, 0.15), (-0.08, 0, 0.44), scenes.paint("#d9a27c", 0.6), plane)
     scenes.ball((0.145, 0.145, 0.1), (-0.09, 0, 0.52), dark, plane)
-    scenes.plate(
-        [(-0.02, 0.28), (0.3, 0.26), (0.16, 0.46), (0.06, 0.46)],
-        0.3,
-        (0, 0, 0),
-        scenes.paint("#a8c8d8", 0.15),
-        0.02,
-        plane,
-    )
+    shield = [(-0.02, 0.28), (0.3, 0.26), (0.16, 0.46), (0.06, 0.46)]
+    scenes.plate(shield, 0.3, (0, 0, 0), scenes.paint("#a8c8d8", 0.15), 0.02, plane)
     for x in (0.42, -0.5):
         scenes.tube((x, -0.16, -0.42), (x, 0.16, -0.42), 0.12, dark, parent=plane)
     number = f"{1 + list(PLANES).index(name)}"
@@ -134,8 +122,7 @@ def _plane(scenes, name: str, color: str, start: float) -> None:
     scenes.text(number, 0.3, (-0.42, -0.355, 0.02), dark, plane)
 
 
-def still(shots):
-    shot, plain = shots
+def still(shot, plain):
     return stills.sheet(
         stills.row(
             Panel(shot.result(FRAME)[CROP], f"One frame for the red plane, a layer; {WINDOW} for all else"),
@@ -150,7 +137,6 @@ def still(shots):
 
 ITEM = Item(
     name="object_matte",
-    figure=None,
     title="one object of a 3D scene is sharp, by its Cryptomatte",
     footage=footage,
     recipes=("object_matte.json", "object_matte-plain.json"),

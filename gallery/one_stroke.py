@@ -14,15 +14,14 @@ FRAMES = 8, 15, 22, 29
 STREET = slice(190, 370), slice(500, 768)
 
 
-def still(shots):
-    shot, plain = shots
+def still(shot, plain):
     return stills.sheet(
         row(shot.source, *(f"Frame {frame}" for frame in FRAMES)),
         row(plain.scribbles, "One stroke, tracked"),
         row(plain.coefficients, "How much of each shutter"),
         row(plain.result, "Twelve frames"),
         row(shot.result, "The same, she is a layer"),
-        caption=ITEM.caption,
+        caption="Footage: vtest.avi of OpenCV's samples, Apache-2.0",
     )
 
 
@@ -34,11 +33,9 @@ def row(shown, *words):
 
 ITEM = Item(
     name="one_stroke",
-    figure=None,
     title="one stroke, tracked, finds the edges of a woman who walks, and as a layer she leaves no ghost",
     footage=walkers,
     recipes=("one_stroke.json", "one_stroke-plain.json"),
     frames=(1, 34),
     still=still,
-    caption="Footage: vtest.avi of OpenCV's samples, Apache-2.0",
 )

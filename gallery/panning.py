@@ -31,8 +31,6 @@ def footage(folder: Path) -> Path:
     """240 frames a second: the scooter moves by more than three pixels a frame."""
     from . import scenes
 
-    if first := scenes.complete(folder, COUNT):
-        return first
     _begin(scenes, samples=4)
     return scenes.render_frames(folder, COUNT)
 
@@ -42,32 +40,26 @@ def truth(folder: Path, samples: int = 64) -> Path:
     stands as the still one does."""
     from . import scenes
 
-    path = folder / f"{FRAME:04}.png"
-    if not path.exists():
-        scene = _begin(scenes, samples, motion_blur=float(WINDOW))
-        scene.render.motion_blur_position = "CENTER"
-        start = scene.camera.rotation_euler.copy()
-        scenes.animate(scene.camera, COUNT, rotation_euler=lambda frame: (*start[:2], start[2] - bearing(frame)))
-        for thing in scene.objects:
-            thing.cycles.motion_steps = 5
-        scenes.render_frames(folder, FRAME, first=FRAME)
-    return path
+    scene = _begin(scenes, samples, motion_blur=float(WINDOW))
+    scene.render.motion_blur_position = "CENTER"
+    start = scene.camera.rotation_euler.copy()
+    scenes.animate(scene.camera, COUNT, rotation_euler=lambda frame: (*start[:2], start[2] - bearing(frame)))
+    for thing in scene.objects:
+        thing.cycles.motion_steps = 5
+    return scenes.render_frames(folder, FRAME, first=FRAME)
 
 
 def mask(folder: Path) -> Path:
     """What the scooter and its rider cover of the shown frame, white on black."""
     from . import scenes
 
-    path = folder / f"{FRAME:04}.png"
-    if not path.exists():
-        scene = _begin(scenes, samples=16)
-        scene.cycles.use_denoising = False
-        scene.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0
-        scene.view_layers[0].material_override = scenes.glow("#ffffff", 1.0)
-        for thing in scene.objects:
-            thing.hide_render = thing.type == "LIGHT" or not _is_part(thing)
-        scenes.render_frames(folder, FRAME, first=FRAME)
-    return path
+    scene = _begin(scenes, samples=16)
+    scene.cycles.use_denoising = False
+    scene.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0
+    scene.view_layers[0].material_override = scenes.glow("#ffffff", 1.0)
+    for thing in scene.objects:
+        thing.hide_render = thing.type == "LIGHT" or not _is_part(thing)
+    return scenes.render_frames(folder, FRAME, first=FRAME)
 
 
 def drawn() -> dict:
@@ -89,7 +81,6 @@ def bearing(frame: float) -> float:
 
 
 def _begin(scenes, samples: int, motion_blur: float = 0.0):
-    """The scene, with the still camera."""
     scene = scenes.begin("#c4d4e6", 0.75, samples=samples, motion_blur=motion_blur)
     scene.render.resolution_x, scene.render.resolution_y = SIZE
     scenes.camera((0, -DISTANCE, HEIGHT), (0, 0, HEIGHT), 85)
@@ -104,7 +95,6 @@ def _is_part(thing) -> bool:
 
 
 def _street(scenes) -> None:
-    """A pavement before shops: tiles, doors, windows, signs and posters."""
     grey, stone, dark, line = (scenes.paint(color, 0.9) for color in ("#55585d", "#a9a294", "#2c3136", "#d8d4c8"))
     scenes.box((60, 40, 0.2), (0, -17, -0.1), grey)
     scenes.box((60, 2.0, 0.3), (0, 2.6, 0), stone)
@@ -135,7 +125,6 @@ def _shop(scenes, x: float, words: str, color: str) -> None:
 
 
 def _scooter(scenes) -> None:
-    """A scooter with its rider, who delivers parcels."""
     mint, cream = scenes.paint("#2f9d8f", 0.35), scenes.paint("#f4ecd9", 0.4)
     dark, chrome = scenes.paint("#202327", 0.7), scenes.paint("#c9cdd0", 0.3, 0.6)
     root = scenes.empty()
@@ -159,7 +148,6 @@ def _scooter(scenes) -> None:
 
 
 def _parcels(scenes, root) -> None:
-    """The box behind the rider."""
     scenes.box((0.5, 0.46, 0.46), (-0.86, 0, 1.06), scenes.paint("#f3c623", 0.6), 0.03, root)
     ink = scenes.paint("#23262b", 0.8)
     scenes.text("POST", 0.16, (-0.86, -0.24, 1.14), ink, root)
@@ -184,14 +172,8 @@ def _wheel(scenes, root, x: float, dark, chrome) -> None:
     for i in range(5):
         scenes.ball(0.03, (0.09 * cos(0.4 * i * pi), -0.075, 0.09 * sin(0.4 * i * pi)), dark, hub)
     scenes.animate(hub, COUNT, rotation_euler=lambda frame: (0, place(frame) / WHEEL, 0))
-    scenes.plate(
-        [(x - 0.27, 0.3), (x - 0.16, 0.52), (x + 0.1, 0.54), (x + 0.27, 0.34), (x + 0.1, 0.44)],
-        0.18,
-        (0, 0, 0),
-        scenes.paint("#2f9d8f", 0.35),
-        0.02,
-        root,
-    )
+    guard = [(x - 0.27, 0.3), (x - 0.16, 0.52), (x + 0.1, 0.54), (x + 0.27, 0.34), (x + 0.1, 0.44)]
+    scenes.plate(guard, 0.18, (0, 0, 0), scenes.paint("#2f9d8f", 0.35), 0.02, root)
 
 
 def _rider(scenes, root, dark) -> None:
@@ -213,8 +195,7 @@ def _rider(scenes, root, dark) -> None:
         scenes.box((0.04, 0.03, 0.34), (-0.45 + 0.075 * i, -0.16, 1.17), white, parent=root)
 
 
-def still(shots):
-    (shot,) = shots
+def still(shot):
     with open_source(truth(shot.footage.parents[1] / "truth")) as source:
         panned = source.read(0)[..., :3] / np.float32(255)
     count = f"{WINDOW} frames"
@@ -231,7 +212,6 @@ def still(shots):
 
 ITEM = Item(
     name="panning",
-    figure=None,
     title="a panning shot of what a still camera took",
     footage=footage,
     recipes=("panning.json",),

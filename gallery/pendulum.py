@@ -22,8 +22,6 @@ def angle(frame: float) -> float:
 def footage(folder: Path) -> Path:
     from . import scenes
 
-    if first := scenes.complete(folder, COUNT):
-        return first
     scenes.begin("#8fa6c4", 0.35)
     scenes.camera((0, -9.6 * 85 / 36, 0), (0, 0, 0), 85)
     scenes.lamp("AREA", 1500, (-5, -7, 7), size=3, color="#fff0dc")
@@ -68,8 +66,7 @@ def _pendulum(scenes) -> None:
     scenes.animate(pivot, COUNT, rotation_euler=lambda frame: (0, -angle(frame), 0))
 
 
-def still(shots):
-    (shot,) = shots
+def still(shot):
     frame, side, middle = 40, 366, 836
     scribbles = stills.scaled(shot.scribbles(frame), side)
     for name, corner in (("Long", "bottom left"), ("Sharp", "bottom right")):

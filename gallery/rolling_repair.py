@@ -26,15 +26,12 @@ AWAY, WIDTH = 24, 9.6  # metres from the street, and of it that are seen
 
 
 def footage(folder: Path) -> Path:
-    from . import scenes
-
-    return scenes.complete(folder, COUNT) or _render(folder, READOUT, range(1, COUNT + 1))
+    return _render(folder, READOUT, range(1, COUNT + 1))
 
 
 def at_once(folder: Path) -> Path:
     """The shown frame by a camera that reads all rows at once."""
-    file = folder / f"{FRAME:04}.png"
-    return file if file.exists() else _render(folder, 0, range(FRAME, FRAME + 1))
+    return _render(folder, 0, range(FRAME, FRAME + 1))
 
 
 def _render(folder: Path, readout: float, frames: range) -> Path:
@@ -56,8 +53,7 @@ def _render(folder: Path, readout: float, frames: range) -> Path:
     return scenes.render_frames(folder, frames[-1], "PNG", frames[0])
 
 
-def still(shots):
-    (shot,) = shots
+def still(shot):
     with open_source(at_once(shot.footage.parent.with_name("at_once"))) as source:
         truth = source.read(0)[..., :3] / np.float32(255)
     return stills.sheet(
@@ -74,7 +70,6 @@ def still(shots):
 
 ITEM = Item(
     name="rolling_repair",
-    figure=None,
     title="what a rolling shutter has skewed stands upright again",
     footage=footage,
     recipes=("rolling_repair.json",),

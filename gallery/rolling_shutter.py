@@ -17,8 +17,6 @@ RADIUS = 0.42
 def footage(folder: Path) -> Path:
     from . import scenes
 
-    if first := scenes.complete(folder, COUNT):
-        return first
     scenes.begin("#a9cdea", 0.8, samples=2)
     scenes.camera((0, -24, 1.75), (0, 0, 1.75), 36 * 24 / 9.6)
     scenes.lamp("SUN", 3.2, (-6, -9, 10), color="#fff1d6", size=0.03)
@@ -76,8 +74,7 @@ def car(scenes) -> None:
     scenes.animate(car, COUNT, location=lambda frame: (SPEED * (frame - COUNT / 2), 0, 0))
 
 
-def still(shots):
-    (shot,) = shots
+def still(shot):
     before, after = 7, 30
     return stills.sheet(
         stills.row(

@@ -44,17 +44,18 @@ def begin(sky: str, strength: float = 1.0, samples: int = 4, motion_blur: float 
     return scene
 
 
-def render_frames(folder: Path, count: int, file_format: str = "PNG", first: int = 1, mode: str = "RGB") -> Path:
+def render_frames(
+    folder: Path, count: int, file_format: str = "PNG", first: int = 1, mode: str = "RGB", depth: str = "16"
+) -> Path:
     """Renders the scene's frames from the first to count that the folder does not have yet; the first one's path.
 
-    file_format: PNG (8 bits) or OPEN_EXR (half float, scene-linear); mode: RGB or RGBA
+    file_format: PNG (8 bits) or OPEN_EXR (scene-linear, of a depth in bits); mode: RGB or RGBA
     """
     folder.mkdir(parents=True, exist_ok=True)
     scene = bpy.context.scene
     settings = scene.render.image_settings
-    settings.file_format = file_format
-    settings.color_mode = mode
-    settings.color_depth = "8" if file_format == "PNG" else "16"
+    settings.file_format, settings.color_mode = file_format, mode
+    settings.color_depth = "8" if file_format == "PNG" else depth
     ending = scene.render.file_extension
     paths = [folder / f"{frame:04}{ending}" for frame in range(first, count + 1)]
     part = folder / f".part{ending}"
@@ -147,18 +148,14 @@ def ball(radius, location, material, parent=None):
     data = bpy.data.meshes.new("Ball")
     sphere.to_mesh(data)
     sphere.free()
-    made = bpy.data.objects.new("Ball", data)
-    bpy.context.collection.objects.link(made)
-    return _placed(made, location, material, parent, smooth=True)
+    return _placed(_linked("Ball", data), location, material, parent, smooth=True)
 
 
 def tube(start, end, radius: float, material, end_radius: float | None = None, parent=None):
     """A cylinder from one point to another, or a cone that is cut."""
     x, y, z = (b - a for a, b in zip(start, end, strict=True))
-    length = hypot(x, y, z)
-    bpy.ops.mesh.primitive_cone_add(
-        vertices=48, radius1=radius, radius2=radius if end_radius is None else end_radius, depth=length
-    )
+    radii = {"radius1": radius, "radius2": radius if end_radius is None else end_radius}
+    bpy.ops.mesh.primitive_cone_add(vertices=48, depth=hypot(x, y, z), **radii)
     made = bpy.context.object
     made.rotation_euler = 0, atan2(hypot(x, y), z), atan2(y, x)
     middle = tuple((a + b) / 2 for a, b in zip(start, end, strict=True))
@@ -182,9 +179,7 @@ def mesh(points, faces, location, material, parent=None):
     """A mesh of points (x, y, z) and faces, which are indices of points."""
     data = bpy.data.meshes.new("Mesh")
     data.from_pydata(points, [], list(map(tuple, faces)))
-    made = bpy.data.objects.new("Mesh", data)
-    bpy.context.collection.objects.link(made)
-    return _placed(made, location, material, parent)
+    return _placed(_linked("Mesh", data), location, material, parent)
 
 
 def text(words: str, size: float, location, material, parent=None):
@@ -192,8 +187,7 @@ def text(words: str, size: float, location, material, parent=None):
     curve = bpy.data.curves.new("Text", "FONT")
     curve.body, curve.size, curve.extrude = words, size, 0.01
     curve.align_x, curve.align_y = "CENTER", "CENTER"
-    made = bpy.data.objects.new("Text", curve)
-    bpy.context.collection.objects.link(made)
+    made = _linked("Text", curve)
     made.rotation_euler.x = 1.5708
     return _placed(made, location, material, parent)
 
@@ -216,17 +210,15 @@ def limbs(bones, material, voxel: float, parent=None):
 
 def empty(location=(0, 0, 0), parent=None):
     """Something that others hang on."""
-    made = bpy.data.objects.new("Empty", None)
-    bpy.context.collection.objects.link(made)
+    made = _linked("Empty", None)
     made.location, made.parent = location, parent
     return made
 
 
 def camera(location, target, lens: float) -> None:
     """The camera, looking from a location at a target; lens in mm of a 36 mm wide sensor."""
-    made = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    made = _linked("Camera", bpy.data.cameras.new("Camera"))
     made.data.lens = lens
-    bpy.context.collection.objects.link(made)
     aim(made, location, target)
     bpy.context.scene.camera = made
 
@@ -236,8 +228,7 @@ def lamp(kind: str, energy: float, location, target=(0, 0, 0), color: str = "#ff
     data = bpy.data.lights.new(kind.title(), kind)
     data.energy, data.color = energy, linear(color)[:3]
     setattr(data, {"AREA": "size", "SUN": "angle"}.get(kind, "shadow_soft_size"), size)
-    made = bpy.data.objects.new(kind.title(), data)
-    bpy.context.collection.objects.link(made)
+    made = _linked(kind.title(), data)
     made.parent = parent
     aim(made, location, target)
     return made
@@ -256,6 +247,12 @@ def animate(thing, count: int, **channels) -> None:
         for frame in range(1, count + 2):
             setattr(thing, name, value(frame))
             thing.keyframe_insert(name, frame=frame)
+
+
+def _linked(name: str, data):
+    made = bpy.data.objects.new(name, data)
+    bpy.context.collection.objects.link(made)
+    return made
 
 
 def _scaling(size):

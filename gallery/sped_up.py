@@ -7,8 +7,7 @@ from .stills import Panel
 SPEED, FRAME = 8, 3
 
 
-def still(shots):
-    plain, blurred = shots
+def still(plain, blurred):
     return stills.sheet(
         stills.row(
             Panel(plain.result(FRAME), f"{SPEED} times as fast: every {SPEED}th frame, sharp"),
@@ -19,7 +18,6 @@ def still(shots):
 
 ITEM = Item(
     name="sped_up",
-    figure=None,
     title="footage that is sped up gets a camera's blur",
     footage=panning.footage,
     recipes=("sped_up-plain.json", "sped_up.json"),

@@ -58,12 +58,8 @@ def roll(ball) -> None:
     def x(frame):
         return -6.6 + SPEED * (frame - 1)
 
-    scenes.animate(
-        ball,
-        COUNT,
-        location=lambda frame: (x(frame), 0, 0),
-        rotation_euler=lambda frame: (pi / 2 - 0.3, x(frame) / RADIUS, 0),
-    )
+    scenes.animate(ball, COUNT, location=lambda frame: (x(frame), 0, 0))
+    scenes.animate(ball, COUNT, rotation_euler=lambda frame: (pi / 2 - 0.3, x(frame) / RADIUS, 0))
 
 
 def repeated(first, folder):
@@ -73,12 +69,14 @@ def repeated(first, folder):
     return folder / first.name
 
 
-def still(shots):
-    (shot,) = shots
+def still(shot):
     picture = stills.scaled(shot.result(FRAME), 1240)
     height, width = (picture.shape[0] - 3 * 8) // 4, stills.WIDTH - 1240 - stills.GAP
     graphs = [stills.graph(*shot.bars(FRAME, name), width, height, name) for name in SHUTTERS]
-    return stills.sheet(stills.beside(stills.below(*graphs, gap=8), picture), caption=ITEM.caption)
+    return stills.sheet(
+        stills.beside(stills.below(*graphs, gap=8), picture),
+        caption="One frame of one film: each shelf is a region with a shutter of its own, over the same 32 frames",
+    )
 
 
 ITEM = Item(
@@ -89,5 +87,4 @@ ITEM = Item(
     recipes=("sphere.json",),
     frames=(1, COUNT - 31),
     still=still,
-    caption="One frame of one film: each shelf is a region with a shutter of its own, over the same 32 frames",
 )

@@ -36,12 +36,8 @@ def row(*panels: Panel) -> np.ndarray:
     height = round((WIDTH - GAP * (len(panels) - 1)) / shares.sum())
     edges = np.round(np.cumsum([0, *(shares * height + GAP)])).astype(int)
     edges[-1] = WIDTH + GAP  # whatever rounding has left
-    return beside(
-        *(
-            labelled(scaled(panel.picture, right - left - GAP, height), panel.words)
-            for panel, left, right in zip(panels, edges, edges[1:], strict=False)
-        )
-    )
+    places = zip(panels, edges, edges[1:], strict=False)
+    return beside(*(labelled(scaled(each.picture, b - a - GAP, height), each.words) for each, a, b in places))
 
 
 def beside(*pictures: np.ndarray, gap: int = GAP) -> np.ndarray:

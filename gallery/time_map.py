@@ -8,8 +8,7 @@ FRAME = 31  # that is shown
 CROP = slice(0, 720), slice(40, 940)
 
 
-def still(shots):
-    linear, angle = shots
+def still(linear, angle):
     last = FRAME + linear.contents.options.at(1).window - 1
     return stills.sheet(
         stills.row(
@@ -22,17 +21,15 @@ def still(shots):
             Panel(linear.source(last)[CROP], "Last of 33"),
             Panel(angle.coefficients(FRAME)[CROP], "By the angle"),
         ),
-        caption=ITEM.caption,
+        caption="Big Buck Bunny, © 2008 Blender Foundation, www.bigbuckbunny.org, CC BY 3.0",
     )
 
 
 ITEM = Item(
     name="time_map",
-    figure=None,
     title="every pixel shows its own moment, as a ramp says",
     footage=bunny,
     recipes=("time_map.json", "time_map-angle.json"),
     frames=(1, 100),
     still=still,
-    caption="Big Buck Bunny, © 2008 Blender Foundation, www.bigbuckbunny.org, CC BY 3.0",
 )

@@ -27,7 +27,7 @@ import sys
 import tempfile
 import time
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, partialmethod
 from pathlib import Path
 from unittest import mock
 
@@ -73,10 +73,8 @@ class Noise(FrameSource):
     def __init__(self, width: int, height: int):
         self.width, self.height = width, height
         self._size = width * height
-        rng = np.random.default_rng(0)
-        pixels = rng.integers(0, 256, (self._size + 1_000_003, 4), dtype=np.uint8)
-        pixels[:, 3] = 255
-        self._pixels = pixels
+        self._pixels = np.random.default_rng(0).integers(0, 256, (self._size + 1_000_003, 4), dtype=np.uint8)
+        self._pixels[:, 3] = 255
 
     def close(self) -> None:
         """There is no file."""
@@ -169,7 +167,6 @@ def combined_reference(state: FrameState, mode: str, codes: np.ndarray, c: np.nd
 
 
 def has_mattes() -> bool:
-    """Whether there is what mattes are read with."""
     return all(importlib.util.find_spec(name) for name in ("av", "OpenImageIO"))
 
 
@@ -210,10 +207,8 @@ class LayerCase:
         window, shutters = state.options.window, len(state.bars)
         kind = {"alone": False, "colored": False}
         behind = WeightedFrames(source, lambda index: 1 - self.matte(index), rest=True, **kind)
-        self.windows = [
-            compositor.window(f, window, False, shutters)
-            for f in (behind, WeightedFrames(source, self.matte, rest=False, **kind))
-        ]
+        own = WeightedFrames(source, self.matte, rest=False, **kind)
+        self.windows = [compositor.window(frames, window, False, shutters) for frames in (behind, own)]
 
     @cache  # noqa: B019 – of a case, which goes with it
     def matte(self, index: int) -> np.ndarray:
@@ -292,7 +287,6 @@ class Case:
 
     @cached_property
     def layer(self) -> LayerCase:
-        """Opened when it is first measured."""
         opened = LayerCase(self.compositor, self.source, self.state, 1)
         self.load(*opened.windows)
         return opened
@@ -373,21 +367,15 @@ class Case:
         self.compose(method)
         self.readback(method)
 
-    def matte(self, method: str) -> None:
-        self._lay("matte")
+    def _read(self, kind: str, method: str) -> None:
+        self.mattes.read(kind, self.state.options.aggregate)
 
-    def matte_images(self, method: str) -> None:
-        self._lay("matte_images")
-
-    def _lay(self, kind: str) -> None:
+    def _lay(self, kind: str, method: str) -> None:
         self.layers = self.mattes.read(kind, self.state.options.aggregate)
         self.matte_blend()
 
-    def matte_read(self, method: str) -> None:
-        self.mattes.read("matte", self.state.options.aggregate)
-
-    def matte_images_read(self, method: str) -> None:
-        self.mattes.read("matte_images", self.state.options.aggregate)
+    matte, matte_images = partialmethod(_lay, "matte"), partialmethod(_lay, "matte_images")
+    matte_read, matte_images_read = partialmethod(_read, "matte"), partialmethod(_read, "matte_images")
 
     def matte_blend(self, method: str = "ours") -> None:
         """Lays what was read last, whose values are on the device then."""
@@ -410,29 +398,28 @@ class Case:
         y, x = rng.integers(0, self.source.height, pixels), rng.integers(0, self.source.width, pixels)
         picture = self.readback(method)[y, x, :3].astype(np.float64)
         if method == "layer":
-            block = self.state.options.aggregate
-            c = self.compositor.coefficients(self.handle, len(self.state.bars))[:, y // block, x // block]
-            return levels_apart(picture, self.layer.expected(self._wanted, y, x, c))
+            return levels_apart(picture, self.layer.expected(self._wanted, y, x, self._coefficients(y, x)))
         expected = self._followed(y, x) if method == "follow" else self._reference(y, x, method)
         return levels_apart(picture, expected)
 
     def _reference(self, y, x, method: str) -> np.ndarray:
         """float64 colours (P, 3) of pixels."""
-        options, block = self.state.options, self.state.options.aggregate
         codes = np.stack([self.source.read(k)[y, x] for k in self._wanted])
         if method == "average":
-            encoded = options.light == "encoded"
+            encoded = self.state.options.light == "encoded"
             mean = (codes / 255.0 if encoded else light.to_linear(codes / 255.0))[..., :3].mean(axis=0)
             return light.to_linear(mean) if encoded else mean
-        c = self.compositor.coefficients(self.handle, len(self.state.bars))[:, y // block, x // block]
         if method in COMBINED:
-            return combined_reference(self.state, method, codes, c)
-        return reference(self.state, codes, c)
+            return combined_reference(self.state, method, codes, self._coefficients(y, x))
+        return reference(self.state, codes, self._coefficients(y, x))
+
+    def _coefficients(self, y, x) -> np.ndarray:
+        block = self.state.options.aggregate
+        return self.compositor.coefficients(self.handle, len(self.state.bars))[:, y // block, x // block]
 
     def _followed(self, y, x) -> np.ndarray:
         """float64 colours (P, 3) of pixels of what follows."""
-        block, count = self.state.options.aggregate, len(self.state.bars)
-        c = self.compositor.coefficients(self.handle, count)[:, y // block, x // block].astype(np.float64)
+        c = self._coefficients(y, x).astype(np.float64)
         weights = compositor.mixed_shutter(self.state, np.moveaxis(c, 0, -1))
         weights /= weights.sum(axis=-1, keepdims=True)
         turns, shifts = self.followed.following.at(np.arange(len(self._wanted)))
@@ -446,13 +433,9 @@ class Case:
     def _diffusion_error(self) -> float:
         """Of what was solved last."""
         count, exact = len(self.state.bars), self.compositor.stages()
-        usual = diffusion_gpu.CYCLES, diffusion_gpu.WHOLE
-        try:
-            diffusion_gpu.CYCLES, diffusion_gpu.WHOLE = 12, max(self.labels.shape)
+        with mock.patch.multiple(diffusion_gpu, CYCLES=12, WHOLE=max(self.labels.shape)):
             expected = self.compositor.coefficients(exact.solve(self.labels, count), count)
-        finally:
-            diffusion_gpu.CYCLES, diffusion_gpu.WHOLE = usual
-            exact.release()
+        exact.release()
         return float(np.abs(self.compositor.coefficients(self.handle, count) - expected).max() * 255)
 
     def _matte_error(self) -> float:
@@ -549,9 +532,8 @@ def run(args) -> list[dict]:
         for width, height in args.sizes:
             source = Noise(width, height)
             files = write_mattes(Path(folder), width, height) if has_matte else None
-            for window, count, kind, block in itertools.product(
-                args.windows, args.shutters, args.bars, args.aggregates
-            ):
+            kinds = itertools.product(args.windows, args.shutters, args.bars, args.aggregates)
+            for window, count, kind, block in kinds:
                 options = Options(window, light=args.light, aggregate=block)
                 state = FrameState(options, bars(kind, count, window), shapes(count))
                 follows = "follow" in args.methods and "compose" in args.passes

@@ -60,12 +60,8 @@ def build_without_wheels(output: Path, source: Path = ROOT) -> Path:
     return path
 
 
-def build_with_wheels(without: Path, output: Path, systems: list[str], python: str) -> list[Path]:
-    """Makes a zip for each system, with wheels for a Python version, from the zip without."""
-    return [_build_for(without, output, system, python) for system in systems]
-
-
-def _build_for(without: Path, output: Path, system: str, python: str) -> Path:
+def build_with_wheels(without: Path, output: Path, system: str, python: str = BLENDERS_PYTHON) -> Path:
+    """Makes the zip for a system, with wheels for a Python version, from the zip without."""
     suffix = "" if python == BLENDERS_PYTHON else f"-python{python}"
     path = output / name(f"{suffix}-{system.replace('-', '_')}")
     with tempfile.TemporaryDirectory() as folder:
@@ -160,15 +156,15 @@ def main() -> None:
     parser.add_argument("--output", type=Path, default=ROOT / "dist", metavar="DIR", help="default: dist")
     parser.add_argument("--python", default=BLENDERS_PYTHON, metavar="X.Y", help="Blender's Python (%(default)s)")
     parser.add_argument("--system", action="append", choices=SYSTEMS, help="these systems only; may be given again")
-    parser.add_argument(
-        "--repository", type=Path, metavar="DIR", help="also put the zips with wheels into a repository"
-    )
+    about = "also put the zips with wheels into a repository"
+    parser.add_argument("--repository", type=Path, metavar="DIR", help=about)
     options = parser.parse_args()
     if options.repository and options.repository.resolve() == options.output.resolve():
         parser.error("--repository: it needs a folder of its own")
     options.output.mkdir(parents=True, exist_ok=True)
-    without = build_without_wheels(options.output.resolve())
-    zips = build_with_wheels(without, options.output.resolve(), options.system or list(SYSTEMS), options.python)
+    output, systems = options.output.resolve(), options.system or SYSTEMS
+    without = build_without_wheels(output)
+    zips = [build_with_wheels(without, output, system, options.python) for system in systems]
     if options.repository:
         make_repository(options.repository.resolve(), zips)
     for path in (*zips, without):

@@ -80,7 +80,6 @@ def rendered(
 
 
 def labelled(pictures: Sequence[np.ndarray], texts: Sequence[str]) -> np.ndarray:
-    """Put 8-bit pictures side by side, each with a text."""
     return stills.beside(*(stills.labelled(p / np.float32(255), text) for p, text in zip(pictures, texts, strict=True)))
 
 
@@ -93,7 +92,6 @@ def write_rows(path: Path | None, rows: object) -> None:
 
 
 def fail(sentence: str) -> None:
-    """End the script with a sentence."""
     print(sentence, file=sys.stderr)
     sys.exit(2)
 

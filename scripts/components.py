@@ -62,7 +62,6 @@ def parts(wheel: str, system: str) -> list[Part]:
 
 
 def canonical(path: str) -> str:
-    """A library's file name without a wheel's hash."""
     return _HASH.sub("", path.rsplit("/", 1)[-1])
 
 
@@ -72,18 +71,15 @@ def libraries(members: Iterable[str]) -> dict[str, str]:
 
 
 def metadata(packed: zipfile.ZipFile) -> Message:
-    """What a wheel says of itself."""
     (path,) = (name for name in packed.namelist() if re.fullmatch(r"[^/]+\.dist-info/METADATA", name))
     return BytesParser().parsebytes(packed.read(path))
 
 
 def wheel_name(path: Path | str) -> str:
-    """A wheel's name as its file has it."""
     return Path(path).name.split("-")[0]
 
 
 def identifiers(licence: str) -> list[str]:
-    """The SPDX identifiers of an expression."""
     return re.split(" (?:AND|OR|WITH) ", licence)
 
 

@@ -147,11 +147,8 @@ def with_cuts(films, rng) -> Iterator[Case]:
     for count in (1, 2):
         yield "shots of 1 and 2 frames", *joined(8, count, 8)
     first = rng.integers(0, 5)
-    yield (
-        "distant parts of one film",
-        seen(np.concatenate([bunny[first : first + 10], bunny[-12 - first : -2 - first]])),
-        [10],
-    )
+    parts = bunny[first : first + 10], bunny[-12 - first : -2 - first]
+    yield "distant parts of one film", seen(np.concatenate(parts)), [10]
     for film in films:
         first = rng.integers(len(film) - 20)
         frames = seen(film[first : first + 20])

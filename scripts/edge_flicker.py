@@ -8,7 +8,6 @@ beside the shown one; "alone" is without them. --noise adds noise after the foot
 """
 
 import argparse
-import sys
 from itertools import pairwise
 from pathlib import Path
 from unittest import mock
@@ -90,7 +89,7 @@ def run(args) -> list[dict]:
     return rows
 
 
-def main() -> int:
+def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     names = [film.name for film, *_ in FILMS]
     parser.add_argument("--films", nargs="+", choices=names, default=names)
@@ -103,8 +102,7 @@ def main() -> int:
     print("| film | noise | guide | still | mean | worst frame | 99 % |\n|---|---|---|---|---|---|---|")
     rows = run(args)
     write_rows(args.json, rows)
-    return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -110,7 +109,7 @@ def off(effect: Effect, size) -> float:
     return float(max(apart))
 
 
-def main() -> int:
+def main() -> None:
     parser = argparse.ArgumentParser("following_truth", description=__doc__.splitlines()[0])
     parser.add_argument("scenes", nargs="*", metavar="SCENE", help=", ".join(SCENES))
     parser.add_argument("--output", type=Path, default=ROOT / "out" / "gallery", metavar="DIR")
@@ -123,8 +122,7 @@ def main() -> int:
         for row in found[name]:
             print("  " + ", ".join(f"{key} {value}" for key, value in row.items()), flush=True)
     write_rows(arguments.json, found)
-    return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

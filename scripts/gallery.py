@@ -59,7 +59,7 @@ def make(item: Item, folder: Path, docs: bool) -> int:
             return code
         edit.with_suffix(".blend1").unlink(missing_ok=True)  # Blender keeps the one before
         shots.append(Shot(footage, recipe, film, item.frames[0]))
-    still = item.still(shots)
+    still = item.still(*shots)
     stills.save(still, folder / f"{item.name}.png")
     if docs:
         target = ROOT / "docs" / "gallery" / f"{item.name}.jpg"

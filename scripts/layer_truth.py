@@ -13,13 +13,13 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import cos, pi, sin
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 from comparing import ROOT, psnr, write_rows
 
@@ -47,7 +47,7 @@ WAYS = {
     "layer, Cryptomatte": ("cryptomatte", True),
     "layer, one stroke": ("stroke", True),
 }
-STROKE = [(-1.1, 0.0), (1.1, 0.0)]  # through the subject, in its own units
+STROKE = np.array([(-1.1, 0.0), (1.1, 0.0)])  # through the subject, in its own units
 
 
 @dataclass(frozen=True)
@@ -144,15 +144,12 @@ def render(scene: Scene, folder: Path, size: tuple[int, int], samples: int) -> C
     from gallery import scenes
 
     for part in ("ground", *scene.subjects):
-        if not scenes.complete(folder / part, COUNT, ".exr"):
-            _begin(scenes, scene, [part], size, samples)
-            _render_frames(folder / part)
+        _begin(scenes, scene, [part], size, samples)
+        scenes.render_frames(folder / part, COUNT, "OPEN_EXR", mode="RGBA", depth="32")
     for subject in scene.subjects:
-        mattes = folder / f"cryptomatte {subject}"
-        if not scenes.complete(mattes, COUNT, ".exr"):
-            _begin(scenes, scene, ["ground", *scene.subjects], size, samples)
-            scenes.write_matte(mattes, subject, subject)
-            _render_frames(None)
+        _begin(scenes, scene, ["ground", *scene.subjects], size, samples)
+        scenes.write_matte(folder / f"cryptomatte {subject}", subject, subject)
+        scenes.render_frames(folder / f"beside {subject}", COUNT, "OPEN_EXR")
     return Case(
         name=scene.name,
         parts={part: _read(folder / part) for part in ("ground", *scene.subjects)},
@@ -217,21 +214,6 @@ def _subject(scenes: Any, scene: Scene, part: str) -> None:
     scenes.animate(board, COUNT, location=lambda frame: (*scene.place(part, frame - 1), high))
 
 
-def _render_frames(folder: Path | None) -> None:
-    """None: what is written are mattes alone."""
-    import bpy
-
-    made = bpy.context.scene
-    settings = made.render.image_settings
-    settings.file_format, settings.color_mode, settings.color_depth = "OPEN_EXR", "RGBA", "32"
-    for frame in range(1, COUNT + 1):
-        made.frame_set(frame)
-        bpy.ops.render.render()
-        if folder is not None:
-            folder.mkdir(parents=True, exist_ok=True)
-            bpy.data.images["Render Result"].save_render(str(folder / f"{frame:04}.exr"), scene=made)
-
-
 def _outline(hair: bool) -> list[tuple[float, float]]:
     points = []
     for i in range(360):
@@ -283,7 +265,8 @@ def measure(case: Case, folder: Path) -> list[dict]:
             hidden = ring & ~clear
             row["plate"] = decibels(picture, truth, hidden) if hidden.sum() > 50 else None
             if way == "layer, true matte":
-                row["same bits elsewhere"] = bool(np.array_equal(picture[~ring], without_region(source, rest)[~ring]))
+                without = shown(source, parsed(shutters=[{"name": "Rest", "bars": list(rest)}]), {})
+                row["same bits elsewhere"] = bool(np.array_equal(picture[~ring], without[~ring]))
             rows.append(row)
         sheet = np.concatenate([codes(strip) for strip in strips], axis=1)
         stills.save(sheet / 255, folder / f"{case.name}, {kind}.png")
@@ -334,13 +317,9 @@ def _region(scene: Scene, size: tuple[int, int], subject: str, matte: str, layer
     common = {"name": subject, "shutter": "Subject", "layer": layer}
     if matte != "stroke":
         return common | {"kind": "matte", "path": subject}
-    high = WIDE * size[1] / size[0]
-    keys = [
-        {"frame": frame + 1, "location": [x / WIDE, y / high]}
-        for frame in range(COUNT)
-        for x, y in [scene.place(subject, frame)]
-    ]
-    stroke = [(0.5 + x / WIDE, 0.5 + y / high) for x, y in STROKE]
+    size_of = np.array([WIDE, WIDE * size[1] / size[0]])
+    keys = [{"frame": k + 1, "location": list(scene.place(subject, k) / size_of)} for k in range(COUNT)]
+    stroke = (0.5 + STROKE / size_of).tolist()
     return common | {"kind": "line", "width": 0.08, "strokes": [stroke], "keys": keys}
 
 
@@ -362,16 +341,9 @@ def shown(source: Memory, given: Effect, files: dict) -> np.ndarray:
         renderer.close()
 
 
-def without_region(source: Memory, rest: np.ndarray) -> np.ndarray:
-    return shown(source, parsed(shutters=[{"name": "Rest", "bars": list(rest)}]), {})
-
-
 def near(mask: np.ndarray, reach: int) -> np.ndarray:
     """A mask (H, W) and all within so many pixels of it, along rows and columns."""
-    for axis in (0, 1):
-        padded = np.pad(mask, [(reach, reach) if a == axis else (0, 0) for a in (0, 1)])
-        mask = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1, axis=axis).any(axis=-1)
-    return mask
+    return cv2.dilate(mask.astype(np.uint8), np.ones((2 * reach + 1, 2 * reach + 1))) > 0
 
 
 def codes(picture: np.ndarray) -> np.ndarray:
@@ -393,7 +365,7 @@ def line(row: dict) -> str:
     return f"| {row['scene']} | {row['picture']} | {row['way']} | {row['ring']:.1f} | {plate} | {same} |"
 
 
-def main() -> int:
+def main() -> None:
     parser = argparse.ArgumentParser("layer_truth", description="Layers beside the truth.")
     parser.add_argument("--output", type=Path, default=ROOT / "out" / "layer_truth", metavar="DIR")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there")
@@ -410,8 +382,7 @@ def main() -> int:
         print(*map(line, found), sep="\n", flush=True)
         rows += found
     write_rows(arguments.json, rows)
-    return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

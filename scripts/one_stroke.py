@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -38,11 +37,10 @@ SHOWN = (1, 14, 27, 40)  # frames of the pictures
 WAYS = ("one stroke", "without edges", "without tracking", "GrabCut")
 
 
-def main() -> int:
+def main() -> None:
     names = [scene.name for scene in truth.SCENES]
-    parser = argparse.ArgumentParser(
-        "one_stroke", description="One tracked stroke with Follow Edges, beside the truth."
-    )
+    about = "One tracked stroke with Follow Edges, beside the truth."
+    parser = argparse.ArgumentParser("one_stroke", description=about)
     parser.add_argument("scenes", nargs="*", metavar="SCENE", help=", ".join(names))
     parser.add_argument("--output", type=Path, default=comparing.ROOT / "out" / "one_stroke", metavar="DIR")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there")
@@ -65,26 +63,19 @@ def main() -> int:
                 stills.save(picture, comparing.ROOT / "docs" / f"one_stroke_{scene.name}.jpg")
         print(json.dumps(rows[-1]), flush=True)
     comparing.write_rows(arguments.json, rows)
-    return 0
 
 
 def stroked(scene: truth.Scene, size, window: int = 9, aggregate: int = 1) -> Effect:
     """The effect of a new stroke on the subject at the scene's first frame of tracking, not tracked yet."""
     stroke = truth.on_picture(truth.STROKE, truth.place(scene, scene.start, size), size)
     long, sharp = [1.0] * window, [0.0] * (window // 2) + [1.0] + [0.0] * (window // 2)
-    data = {
-        "version": 1,
-        "window": window,
-        "position": "center",
-        "border": True,
-        "edge_aware": 1,
-        "aggregate": aggregate,
-        "shutters": [
-            {"name": "Long", "color": [0.2, 0.5, 1], "bars": long},
-            {"name": "Sharp", "color": [1, 0.5, 0.1], "bars": sharp},
-        ],
-        "regions": [{"name": NAME, "shutter": "Sharp", "width": 0.02, "strokes": [stroke.tolist()]}],
-    }
+    options = {"version": 1, "window": window, "position": "center", "border": True, "edge_aware": 1}
+    shutters = [
+        {"name": "Long", "color": [0.2, 0.5, 1], "bars": long},
+        {"name": "Sharp", "color": [1, 0.5, 0.1], "bars": sharp},
+    ]
+    region = {"name": NAME, "shutter": "Sharp", "width": 0.02, "strokes": [stroke.tolist()]}
+    data = options | {"aggregate": aggregate, "shutters": shutters, "regions": [region]}
     return recipe_file.parse(json.dumps(data))
 
 
@@ -213,4 +204,4 @@ class Masks:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

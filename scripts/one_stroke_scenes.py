@@ -81,10 +81,9 @@ def render(scene: Scene, folder: Path, size=(640, 360), count: int = COUNT, samp
     """Writes footage/0001.png … and, where nothing covers the board, mask/0001.png …: how much of a pixel the board
     covers, as encoded grey. What is there already stays."""
     scenes.SIZE = size
-    if not scenes.complete(folder / "footage", count):
-        _build(scene, count, samples)
-        scenes.render_frames(folder / "footage", count)
-    if scene.masked and not scenes.complete(folder / "mask", count):
+    _build(scene, count, samples)
+    scenes.render_frames(folder / "footage", count)
+    if scene.masked:
         _build(scene, count, samples, mask=True)
         scenes.render_frames(folder / "mask", count)
 
@@ -94,8 +93,6 @@ def render_apart(scene: Scene, folder: Path, size=(640, 360), count: int = COUNT
     premultiplied. What is there already stays."""
     scenes.SIZE = size
     for part in ("board", "ground"):
-        if scenes.complete(folder / part, count, ".exr"):
-            continue
         _build(scene, count, samples)
         bpy.context.scene.render.film_transparent = True
         for thing in bpy.data.objects:
@@ -152,13 +149,9 @@ def _build(scene: Scene, count: int, samples: int, mask: bool = False) -> None:
         _shadow(board)
         _board(board, _mottled(*scene.paint[:2], 0.1), [scenes.glow(color, 1.0) for color in scene.paint[1:]])
 
-    scenes.animate(
-        board,
-        count,
-        location=lambda key: (*scene.board(key)[:2], 0.0),
-        rotation_euler=lambda key: (0, 0, scene.board(key)[2]),
-        scale=lambda key: (scene.board(key)[3],) * 3,
-    )
+    scenes.animate(board, count, location=lambda key: (*scene.board(key)[:2], 0.0))
+    scenes.animate(board, count, rotation_euler=lambda key: (0, 0, scene.board(key)[2]))
+    scenes.animate(board, count, scale=lambda key: (scene.board(key)[3],) * 3)
     if scene.cover:
         bar = _sheet((COVER, 14, 1), dark if mask else _mottled("#6b7f9e", "#3d4a63", 0.2))
         scenes.animate(bar, count, location=lambda key: (scene.cover(key), 0, 1))
@@ -173,7 +166,6 @@ def _sheet(size, material, parent=None):
 
 
 def _board(parent, base, paints) -> None:
-    """The board, with discs, words and a band on it."""
     scenes.mesh([(x, y, 0) for x, y in OUTLINE], [range(len(OUTLINE))], (0, 0, 0.1), base, parent)
     for i, (x, y, radius) in enumerate([(-0.9, 0.9, 0.3), (0.1, 1.25, 0.22), (1.2, 0.7, 0.34), (-1.4, -0.1, 0.2)]):
         turns = np.linspace(0, 2 * pi, 33)[:-1]
@@ -185,12 +177,10 @@ def _board(parent, base, paints) -> None:
 
 
 def _shadow(parent) -> None:
-    """A soft shadow of the board on the ground."""
     material = bpy.data.materials.new("Shadow")
     scenes.shade(material, "BsdfTransparent")
     tree = material.node_tree
-    height, width = 256, 256
-    y, x = (np.mgrid[:height, :width] + 0.5 - height / 2) * 6 / height
+    y, x = (np.mgrid[:256, :256] + 0.5 - 128) * 6 / 256
     reach = np.hypot(x, y) - 2.1 * (1 + 0.16 * np.cos(3 * np.arctan2(y, x)) + 0.07 * np.sin(5 * np.arctan2(y, x)))
     passed = 1 - 0.55 / (1 + np.exp(8 * reach))
     _textured(tree, np.repeat(passed[..., None], 3, axis=-1), "Transparent BSDF")
@@ -208,7 +198,6 @@ def _camera(scene: Scene, count: int) -> None:
 
 
 def _straighten(thing) -> None:
-    """No ease between keys."""
     for owner in (thing, thing.data):
         if owner is not None and owner.animation_data and owner.animation_data.action:
             for curve in owner.animation_data.action.layers[0].strips[0].channelbags[0].fcurves:
@@ -224,9 +213,8 @@ def _mottled(first: str, second: str, amount: float, size: int = 512):
     patches, fine = (_noise(rng, size, wave) for wave in (90, 16))
     share = np.clip(0.5 + patches / 2, 0, 1)[..., None]
     ends = [np.array(scenes.linear(color)[:3]) for color in (first, second)]
-    _textured(
-        material.node_tree, ((1 - share) * ends[0] + share * ends[1]) * np.exp(amount * fine[..., None]), "Emission"
-    )
+    colors = ((1 - share) * ends[0] + share * ends[1]) * np.exp(amount * fine[..., None])
+    _textured(material.node_tree, colors, "Emission")
     return material
 
 

@@ -149,7 +149,6 @@ def _parts(scene: Scene, time: float) -> Iterator[tuple[np.ndarray, str, tuple]]
 
 
 def _limb(root, angle: float, length: float, width: float, upper: str, lower: str, bend: float):
-    """Its two halves."""
     joint = root[0] + length * sin(angle), root[1] + length * cos(angle)
     end = joint[0] + length * sin(angle + bend), joint[1] + length * cos(angle + bend)
     yield _capsule(joint, end, 0.8 * width, 0.6 * width), lower, (joint, -angle - bend)
@@ -182,7 +181,6 @@ def _cape(neck, time: float) -> np.ndarray:
 
 
 def _hair(head, time: float) -> Iterator[np.ndarray]:
-    """Strands, which wave."""
     for i in range(26):
         angle = radians(170 + 7 * i) + 0.12 * sin(time / 2 + i)
         length = 30 + 8 * sin(2.4 * i)

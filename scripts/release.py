@@ -35,7 +35,6 @@ def git(*arguments: str) -> str:
 
 
 def notes(version: str) -> str:
-    """What the changelog says of a version."""
     text = (build.ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
     section = re.search(rf"(?ms)^## {re.escape(version)}$(.*?)(?=^## |\Z)", text)
     if section is None or not section[1].strip():
@@ -120,7 +119,7 @@ def make(folder: Path, commit: str, systems: list[str], text: str) -> None:
     date = int(git("log", "-1", "--format=%ct", commit))
     with tempfile.TemporaryDirectory() as stage:
         without = build.build_without_wheels(folder, committed(commit, Path(stage)))
-        zips = [without, *build.build_with_wheels(without, folder, systems, build.BLENDERS_PYTHON)]
+        zips = [without, *(build.build_with_wheels(without, folder, system) for system in systems)]
     for path in zips:
         normalise(path, date)
         sbom.write(path, path.with_suffix(".cdx.json"))

@@ -15,7 +15,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 from comparing import codes, labelled, listed, measured, parser_of, psnr, read, rendered
-from truth import place, stage
+from truth import place, render, stage
 
 from gallery import stills
 from shutter_addon import blender
@@ -43,9 +43,8 @@ def scene_of(size: tuple[int, int]) -> bpy.types.Scene:
     lamps = [rectangle * (0.1, 6) + (x, 0) for x in (-8.2, -4.7, 2.3, 5.8, 9.3)]
     place(scene, "Lamps", lamps, [(0.02, 0.02, 0.025)] * 2, z="2")
     place(scene, "Pole", [rectangle * (0.3, 6) + (POLE, 0)], [(0.6, 0.02, 0.02)] * 2, z="3")
-    place(
-        scene, "Card", [rectangle * (0.7, 0.5)], [(0.1, 0.45, 0.15), (0.7, 0.8, 0.3)], x="0.15*frame+1.5", y="-2", z="4"
-    )
+    card = [rectangle * (0.7, 0.5)]
+    place(scene, "Card", card, [(0.1, 0.45, 0.15), (0.7, 0.8, 0.3)], x="0.15*frame+1.5", y="-2", z="4")
     scene.camera.driver_add("location", 0).driver.expression = "0.9*sin(0.45*frame)+0.25*sin(1.1*frame+1)"
     scene.render.motion_blur_position = "CENTER"
     scene.render.use_motion_blur = True
@@ -57,13 +56,9 @@ def filmed(scene, folder: Path, frames, share: float, samples: int) -> Path:
     scene.render.motion_blur_shutter = share / (1 - ROW) if share else ROW
     scene.cycles.rolling_shutter_type = "TOP" if share else "NONE"
     scene.cycles.rolling_shutter_duration = ROW
-    scene.cycles.samples = samples
     folder.mkdir()
-    for frame in frames:
-        scene.frame_set(frame)
-        bpy.ops.render.render()
-        bpy.data.images["Render Result"].save_render(str(folder / f"{frame + 1:04d}.exr"), scene=scene)
-    return folder / f"{frames[0] + 1:04d}.exr"
+    files = [render(scene, folder / f"{frame + 1:04d}.exr", samples, frame) for frame in frames]
+    return files[0]
 
 
 def repaired(first: Path, share: float, folder: Path) -> list[np.ndarray]:

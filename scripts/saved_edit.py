@@ -33,19 +33,14 @@ def _values(first: float, last: float) -> list[dict]:
 
 def regions() -> dict:
     """A recipe with all kinds of regions."""
+    following = {"follow": "walker", "follow_motion": "location", "follow_smooth": 1}
     shutters = [
         {"name": "Long", "color": [0.2, 0.5, 1.0], "bars": [1, 1, 0.5, 1]},
         {"name": "Keyed", "keys": [{"frame": 1, "bars": [1, 0, 0, 0], **EASED}, {"frame": 12, "bars": [0, 0.5, 1, 0]}]},
-        {
-            "name": "Panned",
-            "bars": [1, 1, 1, 1],
-            "follow": "walker",
-            "follow_motion": "location",
-            "follow_smooth": 1,
-            "trail": _values(0.1, 0.3),
-        },
+        {"name": "Panned", "bars": [1, 1, 1, 1], "trail": _values(0.1, 0.3), **following},
         {"name": "Steady", "bars": [1, 1, 1, 1], "follow": "camera"},
     ]
+    matte = {"path": "footage/matte.exr", "channel": "subject", "invert": True, "offset": 1, "timing": "timeline"}
     parts = [
         {
             "name": "walker",
@@ -64,30 +59,11 @@ def regions() -> dict:
             "width": _values(0.05, 0.1),
             "keys": [{"frame": 1, "strokes": [_SQUARE]}, {"frame": 9, "strokes": [_SHIFTED]}],
         },
-        {
-            "name": "matte",
-            "shutter": "Keyed",
-            "kind": "matte",
-            "path": "footage/matte.exr",
-            "channel": "subject",
-            "invert": True,
-            "offset": 1,
-            "timing": "timeline",
-            "blend": "add",
-            "opacity": 0.5,
-        },
+        {"name": "matte", "shutter": "Keyed", "kind": "matte", "blend": "add", "opacity": 0.5, **matte},
         {"name": "ramp", "shutter": "Keyed", "kind": "ramp", "ramp": "radial", "opacity": 0.4, "keys": _MOVES},
     ]
-    return {
-        "version": 2,
-        "window": 4,
-        "position": "center",
-        "edge_aware": _values(0.2, 0.8),
-        "shutters": shutters,
-        "regions": parts,
-        "camera": _MOVES,
-        "camera_influence": _values(1, 0.5),
-    }
+    keyed = {"edge_aware": _values(0.2, 0.8), "camera": _MOVES, "camera_influence": _values(1, 0.5)}
+    return {"version": 2, "window": 4, "position": "center", "shutters": shutters, "regions": parts} | keyed
 
 
 def combined() -> dict:
@@ -101,23 +77,10 @@ def combined() -> dict:
         {"name": "light", "shutter": "Lights", "kind": "lasso", "strokes": [_SQUARE], "layer": True},
         {"name": "bright", "shutter": "Shades", "kind": "ramp", "ramp": "luminance", "opacity": 0.5},
     ]
-    return {
-        "version": 2,
-        "window": 6,
-        "position": "end",
-        "interpolation": "value",
-        "light": "encoded",
-        "exposure": "weighted",
-        "edges": "mirror",
-        "aggregate": 2,
-        "border": True,
-        "stop_at_cuts": False,
-        "plate_reach": 3,
-        "decontaminate": False,
-        "shutters": shutters,
-        "regions": parts,
-        "time": _values(1, 9),
-    }
+    words = {"position": "end", "interpolation": "value", "light": "encoded", "exposure": "weighted", "edges": "mirror"}
+    flags = {"border": True, "stop_at_cuts": False, "decontaminate": False}
+    numbers = {"version": 2, "window": 6, "aggregate": 2, "plate_reach": 3, "time": _values(1, 9)}
+    return {"shutters": shutters, "regions": parts} | words | flags | numbers
 
 
 def _carried() -> dict:

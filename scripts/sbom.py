@@ -82,7 +82,6 @@ def _extension(manifest: dict, digest: str) -> Component:
 
 
 def _model(its: dict, content: bytes) -> Component:
-    """A neural network."""
     return Component(
         name=its["name"],
         type=ComponentType.MACHINE_LEARNING_MODEL,
@@ -94,7 +93,6 @@ def _model(its: dict, content: bytes) -> Component:
 
 
 def _wheel(path: str, packed: zipfile.ZipFile, system: str) -> tuple[Component, list[Component]]:
-    """A wheel, and the libraries that it bundles."""
     content, name = packed.read(path), components.wheel_name(path)
     its = components.DATA["wheel"][name]
     with zipfile.ZipFile(io.BytesIO(content)) as wheel:

@@ -124,7 +124,6 @@ def scrolled_down(region):
 
 
 def baked():
-    """The effect is baked, looked at and brought back."""
     strips = driver.edit().sequence_editor.strips_all
     ends = {strip.name: strip.right_handle for strip in strips}
     for strip in strips:

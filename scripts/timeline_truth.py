@@ -18,7 +18,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 from comparing import codes, labelled, listed, measured, parser_of, read, rendered
-from truth import compare, place, stage
+from truth import compare, place, render, stage
 
 from gallery import stills
 
@@ -37,9 +37,10 @@ def position(case: str, frame: float) -> float:
 CASES = {"eight times": "8*frame", "ramp": f"(frame+{3.5 / TIMELINE}*frame*frame)"}
 
 
-def filmed(size: tuple[int, int], clock: str = "frame") -> bpy.types.Scene:
-    """The scene, whose frame of the footage is what `clock` says of Blender's."""
+def filmed(size: tuple[int, int], clock: str = "frame", shutter: float = 0.0) -> bpy.types.Scene:
+    """The scene, whose frame of the footage is what `clock` says of Blender's. shutter: how long it is open"""
     scene = stage(*size)
+    scene.render.use_motion_blur, scene.render.motion_blur_shutter = shutter > 0, shutter or 1
     rectangle = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
     place(scene, "Night", [rectangle * (9, 0.6) + (0, -3.9)], [(0, 0, 0)] * 2, z="5")
     place(scene, "Rod", [rectangle * (0.15, 1)], [(0.9, 0.9, 0.9)] * 2, x=f"{FIRST}+{ROD_WAY / MOMENT}*frame", y="-4.4",
@@ -48,15 +49,6 @@ def filmed(size: tuple[int, int], clock: str = "frame") -> bpy.types.Scene:
         for curve in thing.animation_data.drivers if thing.animation_data else ():
             curve.driver.expression = curve.driver.expression.replace("frame", f"({MOMENT}*{clock})")
     return scene
-
-
-def render(scene, file: Path, frame: int, samples: int, shutter: float = 0.0) -> Path:
-    scene.render.use_motion_blur, scene.render.motion_blur_shutter = shutter > 0, shutter or 1
-    scene.cycles.samples = samples
-    scene.frame_set(frame)
-    bpy.ops.render.render()
-    bpy.data.images["Render Result"].save_render(str(file), scene=scene)
-    return file
 
 
 def recipe(case: str, *, timeline: bool = True, smooth: int = 8) -> dict:
@@ -91,15 +83,13 @@ def measure(args, folder: Path) -> tuple[list[dict], np.ndarray]:
     scene = filmed(args.size)
     count = 8 * (max(args.frames) + 1) + WINDOW + 1
     for index in range(count):
-        render(scene, folder / f"{index + 1:04d}.exr", index, max(args.samples // 8, 16))
+        render(scene, folder / f"{index + 1:04d}.exr", max(args.samples // 8, 16), index)
     still = read(folder / "0002.exr")
     ways = {"timeline": {}, "not smooth": {"smooth": 1}, "bars": {"timeline": False}}
     rows, strips = [], []
     for case, clock in CASES.items():
-        scene = filmed(args.size, clock)
-        truths = [
-            render(scene, folder / f"{case}-{frame}.exr", frame, args.samples, shutter=0.5) for frame in args.frames
-        ]
+        scene = filmed(args.size, clock, shutter=0.5)
+        truths = [render(scene, folder / f"{case}-{frame}.exr", args.samples, frame) for frame in args.frames]
         made = {way: exposed(folder, recipe(case, **said), args.frames, f"{case} {way}") for way, said in ways.items()}
         for at, (frame, truth) in enumerate(zip(args.frames, map(read, truths), strict=True)):
             speed = (position(case, frame + 0.5) - position(case, frame)) * 2

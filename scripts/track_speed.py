@@ -9,9 +9,7 @@ FOOTAGE is scaled to that size first. "decode" reads every frame; "track" reads 
 from __future__ import annotations
 
 import argparse
-import json
 import statistics
-import sys
 import tempfile
 import time
 from contextlib import contextmanager
@@ -19,8 +17,7 @@ from pathlib import Path
 
 import av
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from comparing import ROOT, write_rows
 
 from shutter_addon.core.model.effect import Drawings, Moves, Region
 from shutter_addon.core.model.keyframes import Constant
@@ -29,7 +26,6 @@ from shutter_addon.media import PrefetchSource, open_source
 from shutter_addon.media.cuts import ShotSource
 from shutter_addon.media.footage import AHEAD, KEPT, Footage
 
-ROOT = Path(__file__).resolve().parents[1]
 REGIONS = {"line": [[0.5, 0.4], [0.5, 0.6]], "lasso": [[0.25, 0.25], [0.75, 0.25], [0.75, 0.75], [0.25, 0.75]]}
 
 
@@ -122,8 +118,7 @@ def main() -> None:
         row |= {"width": width, "height": height}
         numbers = f"{row['frames']:4} frames {row['fps']:7.1f} fps {row['cpu_ms']:6.1f} ms of CPU a frame"
         print(f"{row['region']:6} {row['way']:12} {numbers}")
-    if arguments.json:
-        arguments.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+    write_rows(arguments.json, rows)
 
 
 if __name__ == "__main__":

@@ -103,7 +103,7 @@ def subframes(scene, samples: int, folder: Path) -> Path:
     cycles.use_sample_subset, cycles.sample_subset_length = True, part
     for index in range(SUBFRAMES):
         cycles.sample_offset = index * part
-        render(scene, folder / f"{index + 1:04d}.exr", SEEDS[0], part * SUBFRAMES, (index + 0.5) / SUBFRAMES)
+        render(scene, folder / f"{index + 1:04d}.exr", part * SUBFRAMES, time=(index + 0.5) / SUBFRAMES)
     cycles.use_sample_subset = False
     return folder / "0001.exr"
 
@@ -117,17 +117,15 @@ def expose(scene, case: str, samples: int, folder: Path) -> list[np.ndarray]:
     scene.render.use_motion_blur = True
     scene.cycles.rolling_shutter_type = "TOP" if case == "rolling" else "NONE"
     scene.cycles.rolling_shutter_duration = ROW
-    files = [folder / f"{case}-{seed}.exr" for seed in SEEDS[1:]]
-    for file, seed in zip(files, SEEDS[1:], strict=True):
-        render(scene, file, seed, samples // 2)
-    return [read(file) for file in files]
+    return [read(render(scene, folder / f"{case}-{seed}.exr", samples // 2, seed=seed)) for seed in SEEDS[1:]]
 
 
-def render(scene, file: Path, seed: int, samples: int, time: float = 0) -> None:
+def render(scene, file: Path, samples: int, frame: int = 0, time: float = 0, seed: int = SEEDS[0]) -> Path:
     scene.cycles.seed, scene.cycles.samples = seed, samples
-    scene.frame_set(0, subframe=time)
+    scene.frame_set(frame, subframe=time)
     bpy.ops.render.render()
     bpy.data.images["Render Result"].save_render(str(file), scene=scene)
+    return file
 
 
 def recipe(case: str) -> dict:

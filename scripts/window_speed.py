@@ -67,12 +67,14 @@ def add_effect(edit, source):
     """Three shutters on two lines and the border."""
     from importlib import import_module
 
-    layer = extension().__name__
-    add_effect, recipe_import = (
-        import_module(f"{layer}.{name}") for name in ("editing.add_effect", "data.recipe_import")
+    names = (
+        "blender.editing.add_effect",
+        "blender.data.recipe_import",
+        "core.recipes.recipe_file",
+        "core.model.shutters",
     )
-    recipe_file = import_module(f"{layer.rpartition('.')[0]}.core.recipes.recipe_file")
-    shutters = import_module(f"{layer.rpartition('.')[0]}.core.model.shutters")
+    package = extension().__name__.rpartition(".")[0]
+    add_effect, recipe_import, recipe_file, shutters = (import_module(f"{package}.{name}") for name in names)
     strip, effect = add_effect.add_effect(edit, source)
     lines = {"Sharp": [[0.3, 0.2], [0.5, 0.8]], "Ramp": [[0.7, 0.2], [0.7, 0.8]]}
     bars = {"Long": "ANGLE_360", "Sharp": "STILL", "Ramp": "RAMP_UP"}
@@ -137,7 +139,6 @@ def resident() -> float:
 
 
 def previewed():
-    """The preview as large as the options have it."""
     area = next(a for a in timeline()["window"].screen.areas if getattr(a.spaces.active, "view_type", "") == "PREVIEW")
     area.spaces.active.proxy_render_size = f"PROXY_{OPTIONS.percent}"
     region = next(region for region in area.regions if region.type == "PREVIEW")

@@ -118,6 +118,5 @@ def _without_components(content: bytes) -> bytes:
 
 
 def _line(name: str, content: bytes) -> str:
-    """A line of a wheel's RECORD."""
     digest = base64.urlsafe_b64encode(hashlib.sha256(content).digest()).rstrip(b"=").decode()
     return f"{name},sha256={digest},{len(content)}\n"

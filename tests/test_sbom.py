@@ -28,20 +28,16 @@ LINUX = "linux-x64"
 
 @pytest.fixture(scope="module")
 def without(tmp_path_factory):
-    """The zip without wheels."""
     return build.build_without_wheels(tmp_path_factory.mktemp("without"))
 
 
 @pytest.fixture(scope="module")
 def zips(without):
-    """The zips for all systems, by system."""
-    made = build.build_with_wheels(without, without.parent, list(build.SYSTEMS), build.BLENDERS_PYTHON)
-    return dict(zip(build.SYSTEMS, made, strict=True))
+    return {system: build.build_with_wheels(without, without.parent, system) for system in build.SYSTEMS}
 
 
 @pytest.fixture(scope="module")
 def bills(zips):
-    """Their bills of materials, as text."""
     for path in zips.values():
         sbom.write(path, path.with_suffix(".cdx.json"))
     return {system: path.with_suffix(".cdx.json").read_text(encoding="utf-8") for system, path in zips.items()}
@@ -49,7 +45,6 @@ def bills(zips):
 
 @pytest.fixture(scope="module")
 def opencv(zips, tmp_path_factory):
-    """OpenCV's wheel in the zip for Linux."""
     with zipfile.ZipFile(zips[LINUX]) as packed:
         (name,) = (name for name in packed.namelist() if name.startswith("wheels/opencv"))
         return Path(packed.extract(name, tmp_path_factory.mktemp("opencv")))

@@ -74,7 +74,6 @@ def run(folder):
 
 
 def render(folder, expected: int):
-    """The command, twice."""
     options = ["--recipe", folder / "recipe.json", "--frames", "1:2", "--weights", folder / "out" / "weights"]
     for output in ("a", "b"):
         command(expected, "render", folder / "in" / "f0001.png", *options, "--output", folder / "out" / output)
