@@ -9,8 +9,7 @@ import numpy as np
 
 from ..core.caches import RecentValues
 from ..core.frames import light
-from ..core.frames.frame_source import FrameSource, SourceWrapper
-from ..core.frames.planes import Decoded
+from ..core.frames.frame_source import Decoded, FrameSource, SourceWrapper
 from ..core.model.frame_state import FrameState, Layers
 from ..core.model.mattes import FileFrame, MatteReader, Ramp
 from ..core.pixels import layering

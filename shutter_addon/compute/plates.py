@@ -8,8 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..core.caches import RecentValues
-from ..core.frames.frame_source import FrameSource, SourceWrapper
-from ..core.frames.planes import Decoded, Moment, Pair, as_rgba
+from ..core.frames.frame_source import Decoded, FrameSource, Moment, Pair, SourceWrapper, as_rgba
 from ..core.model.frame_state import Layers, Options
 from ..core.pixels import compositor, layering
 from .layer_frames import LayerMattes, RecentFrames, linear, with_colors

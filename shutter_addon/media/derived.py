@@ -18,8 +18,7 @@ import numpy as np
 from OpenImageIO import ImageInput, ImageSpec, geterror
 
 from ..core import atomic_write
-from ..core.frames.frame_source import FrameSource
-from ..core.frames.planes import STEP
+from ..core.frames.frame_source import STEP, FrameSource
 from ..core.messages import MediaError
 from . import flow
 from .files import check_name
