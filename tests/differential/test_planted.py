@@ -12,7 +12,7 @@ from test_differential import MIXED, each_difference
 
 from shutter_addon.compute import cpu, gpu, plates
 from shutter_addon.core.frames import light
-from shutter_addon.core.model import following, keyframes, mattes, scribbles, shutters, trails, windows
+from shutter_addon.core.model import following, keyframes, mattes, scribbles, shutters, windows
 from shutter_addon.core.pixels import combined, compositor, layering
 from shutter_addon.devices import gl
 from shutter_addon.media import matte_values
@@ -31,7 +31,7 @@ FAULTS = {
     "an edge twice": (windows, "source_frames", lambda *given: twice(*given)),
     "nothing followed": (following, "followed", lambda effect, state, *_: state),
     "a dull filter": (compositor, "seen", lambda frame, places, sharp: seen(frame, places, sharp=False)),
-    "trails of no length": (trails, "with_length", lambda bars, *_: bars),
+    "trails of no length": (following, "with_length", lambda bars, *_: bars),
     "edges passed over": (
         cpu.CPUCompositor,
         "solve",

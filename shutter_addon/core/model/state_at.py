@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from . import following, scribbles, trails, windows
+from . import following, scribbles, windows
 from .clip import Clip, Shown
 from .effect import Effect, MatteRegion, Region
 from .frame_state import Following, FrameState, Layers
@@ -37,7 +37,7 @@ def state_at(effect: Effect, clip: Clip, frame: float) -> Moment:
         clip = replace(clip, timing=effect.time)
     at = clip.shown(frame)
     state = _in_moments(effect, effect.at(frame), clip, at)
-    state = trails.exposed(effect, state, clip, at)
+    state = following.exposed(effect, state, clip, at)
     has_trails = any(shutter.has_trail for shutter in effect.shutters)
     state = windows.slid(state, at.source_frame, at.direction, range(clip.count), whole=has_trails)
     state = following.followed(effect, state, clip, at)
