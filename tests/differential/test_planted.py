@@ -13,7 +13,7 @@ from test_differential import MIXED, each_difference
 from shutter_addon.compute import cpu, gpu, plates
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import following, keyframes, mattes, scribbles, shutters, windows
-from shutter_addon.core.pixels import combined, compositor, layering
+from shutter_addon.core.pixels import compositor, layering
 from shutter_addon.devices import gl
 from shutter_addon.media import matte_values
 
@@ -47,8 +47,8 @@ FAULTS = {
     ),
     "ghosts": (layering, "behind", lambda values: np.ones_like(values[0])),
     "what a camera pans over": (plates, "uncovered", lambda colors, seen, *_: (colors, seen)),
-    "the mean for the median": (combined, "weighted_median", lambda values, weights: mean(values, weights)),
-    "thresholds that let all pass": (combined, "passes", lambda combine, luminance: np.ones_like(luminance)),
+    "the mean for the median": (compositor, "weighted_median", lambda values, weights: mean(values, weights)),
+    "thresholds that let all pass": (compositor, "passes", lambda combine, luminance: np.ones_like(luminance)),
     "soft scribbles": (layering, "matte_of", lambda values: values),
     "nothing slides": (windows, "slid", lambda state, *_, **__: state),
     "not normalised": (windows, "source_frames", lambda options, places, shot: places.clip(0, shot.stop - 1)),

@@ -25,7 +25,7 @@ Mode = Literal["average", "lightest", "darkest", "median"]
 
 @dataclass(frozen=True)
 class Combine:
-    """How the frames that a shutter exposes become one picture (core/pixels/combined.py).
+    """How the frames that a shutter exposes become one picture (core/pixels/compositor.py).
 
     Attributes:
         by_luminance: Lightest and darkest only: choose a pixel's frame by luminance, not per channel.
