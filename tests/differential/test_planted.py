@@ -10,7 +10,7 @@ from cases import make_smooth
 from compare import open_devices
 from test_differential import MIXED, each_difference
 
-from shutter_addon.compute import cpu, gpu, plates
+from shutter_addon.compute import cpu, gpu, layer_frames
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import following, keyframes, mattes, scribbles, shutters, windows
 from shutter_addon.core.pixels import compositor, layering
@@ -46,7 +46,7 @@ FAULTS = {
         lambda ramp, *size: ramp_values(replace(ramp, rotation=0), *size),
     ),
     "ghosts": (layering, "behind", lambda values: np.ones_like(values[0])),
-    "what a camera pans over": (plates, "uncovered", lambda colors, seen, *_: (colors, seen)),
+    "what a camera pans over": (layer_frames, "uncovered", lambda colors, seen, *_: (colors, seen)),
     "the mean for the median": (compositor, "weighted_median", lambda values, weights: mean(values, weights)),
     "thresholds that let all pass": (compositor, "passes", lambda combine, luminance: np.ones_like(luminance)),
     "soft scribbles": (layering, "matte_of", lambda values: values),
