@@ -13,8 +13,7 @@ from test_carrying import Footage
 from shutter_addon.core.messages import MediaError
 from shutter_addon.core.model import outlines
 from shutter_addon.media import subject_mattes
-from shutter_addon.media.subject import MODEL, Network
-from shutter_addon.media.subject_mattes import CarriedFile, Subject
+from shutter_addon.media.subject_mattes import MODEL, CarriedFile, Network, Subject
 
 WIDTH, HEIGHT, COUNT = 240, 160, 5
 GROUND = cv2.resize(np.random.default_rng(1).integers(90, 130, (12, 40, 3), np.uint8), (2 * WIDTH, HEIGHT))

@@ -7,7 +7,7 @@ from bpy.props import EnumProperty, IntProperty, StringProperty
 from bpy.types import Context
 
 from ...core.model.choices import CONTEXT
-from ...media.subject import MODEL
+from ...media.subject_mattes import MODEL
 from . import strips
 
 ADDON = __package__.rpartition(".shutter_addon")[0] or "shutter_addon"
