@@ -11,7 +11,7 @@ from ..core.frames.frame_source import FrameSource
 from ..core.model.frame_state import FrameState, Layers
 from ..core.model.mattes import MatteReader
 from ..core.pixels import layering
-from . import layer_frames, window_frames
+from . import layer_frames
 from .guide import Guides, NotedSource
 from .request import Behind, Coefficients, Compositor, Exposure, Handle, Request, Stages
 from .window import summable
@@ -137,8 +137,8 @@ class LayeredRenderer:
 
     def _load(self, windows: dict, request: Request, shot: range) -> None:
         """Load all windows, a few frames at a time, so that each frame is read once for all windows."""
-        options, ordered = request.state.options, np.sort(window_frames.positions(request, shot))
-        lacking = window_frames.exposed_frames(request, shot).difference(self.held)
+        options, ordered = request.state.options, np.sort(request.positions(shot))
+        lacking = request.exposed_frames(shot).difference(self.held)
         step = layer_frames.TOGETHER if len(lacking) > 1 else len(ordered)
         for end in range(step, len(ordered) + step, step):
             for window in windows.values():
