@@ -236,7 +236,7 @@ def drawn_outlines(drawings: Drawings) -> Channel:
 
 @dataclass(frozen=True)
 class FileContent:
-    """A matte file as a recipe names it. `Effect.for_picture` replaces it by a channel that can be read.
+    """A matte file as a recipe names it: not yet a channel that can be read.
 
     Attributes:
         path: A movie, or the first file of an image sequence, relative to the recipe's folder.
@@ -264,7 +264,7 @@ class FileContent:
 
 @dataclass(frozen=True)
 class RampContent:
-    """A ramp as a recipe names it. `Effect.for_picture` replaces it by a channel that can be read."""
+    """A ramp as a recipe names it: not yet a channel that can be read."""
 
     ramp: Literal["linear", "radial", "angle", "luminance"] = choice(
         "Ramp", "Shape of the ramp", RAMPS, default="linear", absent=MISSING
@@ -405,26 +405,6 @@ class Shutter:
         return Combine(self.combine, self.by_luminance, float(self.threshold.at(frame)), float(self.softness.at(frame)))
 
 
-MatteFiles = Callable[[MatteRegion], mattes.MatteFile]
-
-
-def _placed(region: Region | MatteRegion, aspect: float, files: MatteFiles) -> Region | MatteRegion:
-    """Return a recipe's region with a content that can be read."""
-    if region.drawings:
-        region = replace(region, drawings=replace(region.drawings, aspect=aspect))
-    if not isinstance(region, MatteRegion):
-        return region
-    if isinstance(region, OutlineRegion) and region.between == "straight":
-        return replace(region, content=drawn_outlines(region.drawings))
-    content = region.content
-    if isinstance(content, RampContent) and content.ramp != "luminance":
-        return replace(region, content=placed_ramp(content.ramp, region.moves))
-    frames = mattes.FileFrames(file=files(region))
-    if isinstance(content, FileContent):
-        frames = replace(frames, offset=content.offset, first=None if content.timing == "source" else 1)
-    return replace(region, content=frames)
-
-
 @dataclass(frozen=True)
 class Effect:
     """The whole effect, except for its source.
@@ -476,12 +456,13 @@ class Effect:
         shutters_ = tuple(replace(each, follow=each.follow and new[id(each.follow)]) for each in self.shutters)
         return replace(self, shutters=shutters_, regions=tuple(regions), camera=camera)
 
-    def for_picture(self, aspect: float, files: MatteFiles = lambda _region: mattes.NoFile()) -> Effect:
-        """Return the effect of a recipe for a picture of this width / height.
-
-        `files` gives the file of a matte, the source's luminance for a ramp, and the mattes of an outline or a subject.
-        """
-        return self.with_parts([_placed(region, aspect, files) for region in self.regions])
+    def for_picture(self, aspect: float) -> Effect:
+        """Return the effect of a recipe for a picture of this width / height."""
+        regions = [
+            replace(region, drawings=replace(region.drawings, aspect=aspect)) if region.drawings else region
+            for region in self.regions
+        ]
+        return self.with_parts(regions)
 
     def layers_at(self, frame: float) -> list[Region | MatteRegion]:
         """Return the visible layers at a frame, the farthest first."""
