@@ -43,7 +43,7 @@ Drawings = tuple[tuple[int, outlines.Curves], ...]  # source frames with the cur
 
 
 class CarriedMattes(SourceWrapper):
-    """The mattes, a core.model.mattes.MatteSource; close it. Its frames are the source's filmed ones."""
+    """The mattes; close it. Its frames are the source's filmed ones."""
 
     step = 1
 

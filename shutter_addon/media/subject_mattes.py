@@ -10,16 +10,16 @@ a process begins. Between two keyframes, both chains are mixed in the middle.
 from __future__ import annotations
 
 import re
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from ..core import stopping
-from ..core.frames.frame_source import FrameSource
+from ..core.frames.frame_source import Footage, FrameSource
 from ..core.messages import MediaError, of_file
 from ..core.model import outlines, scribbles
 from . import carrying, derived, flow, opencv
@@ -292,15 +292,9 @@ class Subject:
             object.__setattr__(self, name, drawn)
 
 
-class Footage(Hashable, Protocol):
-    """What opens the source; equal where it gives the same frames."""
-
-    def open(self) -> FrameSource: ...
-
-
 @dataclass(frozen=True)
 class CarriedFile:
-    """A core.model.mattes.MatteFile of an outline or a subject.
+    """The mattes of an outline or a subject.
 
     Attributes:
         drawings: By ascending source frame, the curves of each (core.model.outlines).

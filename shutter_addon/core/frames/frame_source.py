@@ -6,7 +6,7 @@ RGB of planes equals libswscale's to the bit.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -265,6 +265,16 @@ class FrameSource(ABC):
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+class Footage(Hashable, Protocol):
+    """What opens a source; equal where it gives the same frames.
+
+    Of a matte's, frames are values (height, width) float32, 0 to 1, and `read` clamps to the file's frames.
+    """
+
+    def open(self) -> FrameSource:
+        """Open the source. MediaError: it cannot be read."""
 
 
 class _Forwarded:

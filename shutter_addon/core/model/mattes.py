@@ -12,8 +12,9 @@ from typing import Literal, Protocol
 
 import numpy as np
 
+from ..frames.frame_source import Footage, FrameSource
 from ..frames.retiming import StripTiming
-from .clip import Clip, Medium
+from .clip import Clip
 from .masks import MaskShape
 from .outlines import Curves, coverage
 
@@ -23,35 +24,6 @@ Between = Literal["carried", "straight"]
 RampKind = Literal["linear", "radial", "angle"]
 # The smallest scale of a ramp, which is almost a step.
 _SMALLEST = 1e-6
-
-
-class MatteFile(Hashable, Protocol):
-    """A movie, an image sequence or a picture with mattes. Files with the same values compare equal."""
-
-    def open(self) -> MatteSource:
-        """Open the file. MediaError: it cannot be read."""
-
-
-class MatteSource(Medium, Protocol):
-    """An opened MatteFile."""
-
-    def read(self, index: int) -> np.ndarray:
-        """Return the values (height, width) float32 of a frame, 0 to 1, top row first, clamped to the file's frames.
-
-        Raises:
-            MediaError: The frame cannot be read.
-        """
-
-    def close(self) -> None:
-        """Close the file."""
-
-
-@dataclass(frozen=True)
-class NoFile:
-    """A MatteFile without values, for a recipe whose folder is not known yet."""
-
-    def open(self) -> MatteSource:
-        raise NotImplementedError
 
 
 @dataclass(frozen=True)
@@ -64,12 +36,12 @@ class FileFrame:
         timing: A strip of the edit, which shows the file at the timeline frame `time`.
     """
 
-    file: MatteFile
+    file: Footage
     offset: int = 0
     time: float | None = None
     timing: StripTiming | None = None
 
-    def index(self, source: MatteSource, shown: int) -> int:
+    def index(self, source: FrameSource, shown: int) -> int:
         """Return the index in the opened file while the source shows the filmed frame `shown`; it may be out of range.
 
         Raises:
@@ -91,7 +63,7 @@ class FileFrames:
         timing: A strip of the edit that shows the file.
     """
 
-    file: MatteFile
+    file: Footage
     offset: int = 0
     first: float | None = None
     timing: StripTiming | None = None
