@@ -12,7 +12,7 @@ from test_differential import MIXED, each_difference
 
 from shutter_addon.compute import cpu, gpu, layer_frames
 from shutter_addon.core.frames import light
-from shutter_addon.core.model import following, keyframes, mattes, scribbles, shutters, windows
+from shutter_addon.core.model import keyframes, mattes, scribbles, shutters, state_at, windows
 from shutter_addon.core.pixels import compositor, layering
 from shutter_addon.devices import gl
 from shutter_addon.media import matte_values
@@ -29,9 +29,9 @@ FAULTS = {
     "no displacement": (shutters, "displace", shutters.mix),
     "another curve": (light, "to_linear", lambda code: np.sign(code) * np.abs(code) ** 2.2),
     "an edge twice": (windows, "source_frames", lambda *given: twice(*given)),
-    "nothing followed": (following, "followed", lambda effect, state, *_: state),
+    "nothing followed": (state_at, "followed", lambda effect, state, *_: state),
     "a dull filter": (compositor, "seen", lambda frame, places, sharp: seen(frame, places, sharp=False)),
-    "trails of no length": (following, "with_length", lambda bars, *_: bars),
+    "trails of no length": (state_at, "with_length", lambda bars, *_: bars),
     "edges passed over": (
         cpu.CPUCompositor,
         "solve",
