@@ -43,11 +43,7 @@ def identity(source: FrameSource) -> dict:
     for path in source.files:
         content.update(content_digest(path))
     known = {name: getattr(source, name) for name in ("count", "transfer", "alpha", "options")}
-    return known | {
-        "content": content.hexdigest(),
-        "size": [source.width, source.height],
-        "dtype": source.dtype.name,
-    }
+    return known | {"content": content.hexdigest(), "size": [source.width, source.height], "dtype": source.dtype.name}
 
 
 def key(made_of: dict) -> str:
