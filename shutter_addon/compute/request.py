@@ -142,7 +142,7 @@ class Compositor(Protocol):
 
     Attributes:
         name: the device's name
-        takes_planes: whether frames are fastest to send as planes (core.frames.planes)
+        takes_planes: whether frames are fastest to send as planes (core.frames.frame_source)
     """
 
     name: str
