@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from itertools import pairwise
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -149,11 +149,11 @@ class MatteRegion(AnyRegion):
     moves.
 
     Attributes:
-        content: Channel of mattes.Content.
+        content: Channel of mattes.Content; as a recipe names it, FileContent or RampContent.
         blend, invert, feather, opacity: See mattes.Matte.
     """
 
-    content: Channel
+    content: Any
     blend: mattes.Blend = Labelled("Blend", "How the matte combines with other regions").choice(
         BLENDS, default="over", context=CONTEXT
     )
@@ -240,9 +240,6 @@ class FileContent:
         "Frames Of", "What the matte's frames are synchronized with"
     ).choice(TIMINGS, default="source")
 
-    def at(self, _frame: float) -> mattes.FileFrame:
-        raise NotImplementedError
-
 
 @dataclass(frozen=True)
 class RampContent:
@@ -252,18 +249,11 @@ class RampContent:
         RAMPS, default="linear", absent=MISSING
     )
 
-    def at(self, _frame: float) -> mattes.Ramp:
-        raise NotImplementedError
-
 
 def placed_ramp(kind: mattes.RampKind, moves: Moves) -> Channel:
     """Return a channel of mattes.Ramp that keys move."""
 
-    def at(frame: float) -> mattes.Ramp:
-        placed = moves.at(frame)
-        return mattes.Ramp(kind=kind, location=placed.location, rotation=placed.rotation, scale=placed.scale)
-
-    return keyframes.Computed(at)
+    return keyframes.Computed(lambda frame: mattes.Ramp(kind, moves.at(frame)))
 
 
 @dataclass(frozen=True)

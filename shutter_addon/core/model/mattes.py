@@ -16,6 +16,7 @@ from ..frames.frame_source import Footage, FrameSource
 from ..frames.retiming import StripTiming
 from .clip import Clip
 from .masks import MaskShape
+from .motions import Placement
 from .outlines import Curves, coverage
 
 Blend = Literal["over", "add"]
@@ -83,22 +84,18 @@ class Ramp:
     the centre to the farthest corner. An angle goes once around the centre, clockwise from the top.
 
     Attributes:
-        location: (2,) fractions of the picture.
-        rotation: Degrees counter-clockwise.
-        scale: About the picture's centre.
+        placed: Where it lies, turned and scaled about the picture's centre.
     """
 
     kind: RampKind
-    location: tuple[float, float] = (0.0, 0.0)
-    rotation: float = 0.0
-    scale: float = 1.0
+    placed: Placement = Placement()
 
     def values(self, width: int, height: int) -> np.ndarray:
         """Return (height, width) float32, 0 to 1, top row first."""
-        scale = max(abs(self.scale), _SMALLEST)
-        x = np.arange(width) + 0.5 - width * (0.5 + self.location[0])
-        y = height * (0.5 - self.location[1]) - (np.arange(height)[:, None] + 0.5)
-        turn = math.radians(self.rotation) + (math.pi if self.scale < 0 else 0)
+        scale = max(abs(self.placed.scale), _SMALLEST)
+        x = np.arange(width) + 0.5 - width * (0.5 + self.placed.location[0])
+        y = height * (0.5 - self.placed.location[1]) - (np.arange(height)[:, None] + 0.5)
+        turn = math.radians(self.placed.rotation) + (math.pi if self.placed.scale < 0 else 0)
         cos, sin = math.cos(turn), math.sin(turn)
         along, across = x * cos + y * sin, y * cos - x * sin
         if self.kind == "angle":
