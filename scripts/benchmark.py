@@ -44,7 +44,7 @@ from shutter_addon.compute.layer_frames import WeightedFrames
 from shutter_addon.compute.request import Behind, Coefficients, Exposure, Request
 from shutter_addon.compute.window import Frames
 from shutter_addon.core.frames import light
-from shutter_addon.core.frames.frame_source import FrameSource
+from shutter_addon.core.frames.frame_source import FrameSource, SourceFile
 from shutter_addon.core.model import mattes, scribbles, shutters
 from shutter_addon.core.model.frame_state import Combine, Following, FrameState, Layers, Options
 from shutter_addon.core.pixels import compositor
@@ -183,7 +183,7 @@ def matte_frames(width: int, height: int):
         yield np.rint(255 * np.maximum(*inside)).astype(np.uint8)
 
 
-def write_mattes(folder: Path, width: int, height: int) -> dict[str, mattes.MatteFile]:
+def write_mattes(folder: Path, width: int, height: int) -> dict[str, SourceFile]:
     """The same frames as a movie and as an image sequence, written into a folder."""
     import av
     from OpenImageIO import ImageBuf

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.frames.frame_source import Footage, FrameSource
+from ..core.frames.frame_source import FrameSource, SourceFile
 from ..core.model.mattes import Content, FileFrame, Matte
 from ..core.pixels.matte_grid import block_means, feathered, fitted
 from .carried_mattes import CarriedMattes
@@ -33,7 +33,7 @@ class MatteValues:
                 None: it is carried.
         """
         self._size, self._step, self._late = (width, height), step, late
-        self._sources: dict[Footage, FrameSource] = {}
+        self._sources: dict[SourceFile, FrameSource] = {}
         self._made: list[tuple[Hashable, np.ndarray]] = []
 
     def another(self) -> MatteValues:

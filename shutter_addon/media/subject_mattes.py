@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from ..core import stopping
-from ..core.frames.frame_source import Footage, FrameSource
+from ..core.frames.frame_source import FrameSource, SourceFile
 from ..core.messages import MediaError, of_file
 from ..core.model import outlines, scribbles
 from . import carrying, derived, flow, opencv
@@ -303,7 +303,7 @@ class CarriedFile:
         model: The file of the network that finds subjects.
     """
 
-    footage: Footage
+    footage: SourceFile
     # Each frame of a window asks for the hash; drawings may have thousands of points.
     drawings: Drawings = field(hash=False)
     folder: Path | None = None

@@ -267,7 +267,7 @@ class FrameSource(ABC):
         self.close()
 
 
-class Footage(Hashable, Protocol):
+class SourceFile(Hashable, Protocol):
     """What opens a source; equal where it gives the same frames.
 
     Of a matte's, frames are values (height, width) float32, 0 to 1, and `read` clamps to the file's frames.

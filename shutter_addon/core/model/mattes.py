@@ -12,7 +12,7 @@ from typing import Literal, Protocol
 
 import numpy as np
 
-from ..frames.frame_source import Footage, FrameSource
+from ..frames.frame_source import FrameSource, SourceFile
 from ..frames.retiming import StripTiming
 from .clip import Clip
 from .masks import MaskShape
@@ -37,7 +37,7 @@ class FileFrame:
         timing: A strip of the edit, which shows the file at the timeline frame `time`.
     """
 
-    file: Footage
+    file: SourceFile
     offset: int = 0
     time: float | None = None
     timing: StripTiming | None = None
@@ -64,7 +64,7 @@ class FileFrames:
         timing: A strip of the edit that shows the file.
     """
 
-    file: Footage
+    file: SourceFile
     offset: int = 0
     first: float | None = None
     timing: StripTiming | None = None
