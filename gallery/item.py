@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from gallery.matte_contents import with_contents
 from shutter_addon.compute.renderer import Renderer, open_compositor
 from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
@@ -107,7 +108,7 @@ class Shot:
 
     @cached_property
     def effect(self) -> Effect:
-        return self.contents.for_picture(self._source.width / self._source.height, self._matte)
+        return with_contents(self.contents.for_picture(self._source.width / self._source.height), self._matte)
 
     @cached_property
     def _source(self):

@@ -44,10 +44,10 @@ from shutter_addon.compute.layer_frames import WeightedFrames
 from shutter_addon.compute.request import Behind, Coefficients, Exposure, Request
 from shutter_addon.compute.window import Frames
 from shutter_addon.core.frames import light
-from shutter_addon.core.frames.frame_source import FrameSource
+from shutter_addon.core.frames.frame_source import FrameSource, SourceFile
 from shutter_addon.core.model import mattes, scribbles, shutters
 from shutter_addon.core.model.frame_state import Combine, Following, FrameState, Layers, Options
-from shutter_addon.core.pixels import combined, compositor
+from shutter_addon.core.pixels import compositor
 from shutter_addon.devices.gl import GLDevice
 from shutter_addon.devices.passes import Pass, read_pass
 
@@ -160,9 +160,9 @@ def combined_reference(state: FrameState, mode: str, codes: np.ndarray, c: np.nd
     encoded = state.options.light == "encoded"
     lights = codes / 255.0 if encoded else light.premultiplied(codes / 255.0, light.to_linear)
     c = np.maximum(c, 0).astype(np.float64)
-    weights = combined.counts(Combine(mode), state.bars, (c / c.sum(axis=0)).T, state.options.interpolation)
-    samples = [combined.Sample(own[:, None], weights[:, None, k]) for k, own in enumerate(lights)]
-    found = combined.of_samples(Combine(mode), samples, encoded=encoded)[:, 0, :3]
+    weights = compositor.counts(Combine(mode), state.bars, (c / c.sum(axis=0)).T, state.options.interpolation)
+    samples = [compositor.Sample(own[:, None], weights[:, None, k]) for k, own in enumerate(lights)]
+    found = compositor.of_samples(Combine(mode), samples, encoded=encoded)[:, 0, :3]
     return light.to_linear(found) if encoded else found
 
 
@@ -180,7 +180,7 @@ def matte_frames(width: int, height: int):
         yield np.rint(255 * np.maximum(*inside)).astype(np.uint8)
 
 
-def write_mattes(folder: Path, width: int, height: int) -> dict[str, mattes.MatteFile]:
+def write_mattes(folder: Path, width: int, height: int) -> dict[str, SourceFile]:
     """The same frames as a movie and as an image sequence, written into a folder."""
     import av
     from OpenImageIO import ImageBuf

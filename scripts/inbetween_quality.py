@@ -25,7 +25,7 @@ from comparing import ROOT, codes, listed, psnr, read_codes, rendered, similarit
 
 from gallery import stills
 from shutter_addon.core.frames import light
-from shutter_addon.core.frames.planes import as_rgba
+from shutter_addon.core.frames.frame_source import as_rgba
 from shutter_addon.media import MediaError, flow, open_source
 
 FILMS = [ROOT / "assets" / name for name in ("bigbuckbunny.mp4", "pedestrians.avi")]

@@ -24,6 +24,7 @@ import numpy as np
 from comparing import ROOT, psnr, write_rows
 
 from gallery import stills
+from gallery.matte_contents import with_contents
 from shutter_addon.compute.renderer import Renderer, open_compositor
 from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
@@ -332,7 +333,7 @@ def camera(scene: Scene) -> list[dict]:
 
 def shown(source: Memory, given: Effect, files: dict) -> np.ndarray:
     """The picture (H, W, 3), scene-linear, of the shown frame. files: of mattes, by subject"""
-    effect = given.for_picture(source.width / source.height, lambda region: files[region.content.path])
+    effect = with_contents(given.for_picture(source.width / source.height), lambda region: files[region.content.path])
     clip = Clip(width=source.width, height=source.height, count=source.count)
     renderer = Renderer(open_compositor(), source, MatteValues(source.width, source.height))
     try:

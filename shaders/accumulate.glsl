@@ -1,7 +1,8 @@
 // Adds a frame to the running sums, or takes it away: from the layer `known` to the layer `next`; of moments, `count` of
 // them, to as many of `layers`. The frame: the one that was sent, `whole` for white, with COVER weighted, with NUMBERS as
 // R + 256 G + 65536 B; with MOMENT one between two that were sent (include/moment.glsl); with PLANES made of luma and
-// chroma as libswscale does (core/frames/planes.py); with AGAIN one that the sums hold between layers `before` and `after`.
+// chroma as libswscale does (core/frames/frame_source.py); with AGAIN one that the sums hold between layers `before` and
+// `after`.
 layout(local_size_x = 8, local_size_y = 16) in;  // a tile
 layout(STORED) uniform uimage2DArray sums;
 uniform ivec2 size;

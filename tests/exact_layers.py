@@ -53,5 +53,6 @@ def compose(
     whole = np.ones((1, *np.shape(coefficients)[1:]))
     for i, shutter in enumerate(state.layers.shutters):
         moved = moves and (moves[0][:, [shutter]], moves[1][:, [shutter]])
-        picture = layering.laid_over(picture, *exposed(state.of([shutter]), mattes[i], whole, moved))
+        color, cover = exposed(state.of([shutter]), mattes[i], whole, moved)
+        picture = color + (1 - cover[..., None]) * picture
     return picture

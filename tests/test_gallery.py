@@ -12,6 +12,7 @@ from OpenImageIO import ImageBuf
 
 from gallery import NAMES, bunny, rolling_repair, time_map
 from gallery.item import HERE, ROOT, Shot
+from gallery.matte_contents import with_contents
 from shutter_addon.compute.renderer import Renderer, open_compositor
 from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
@@ -58,7 +59,7 @@ def test_recipes_load(path):
 
 def test_the_repair_shows_rows_of_as_much_time_as_the_camera_reads():
     """From half a readout before the shown frame, in steps of a moment, to as long behind it."""
-    effect = recipe_file.load(HERE / "rolling_repair.json").for_picture(16 / 9, lambda _region: None)
+    effect = with_contents(recipe_file.load(HERE / "rolling_repair.json").for_picture(16 / 9))
     steps = effect.options.at(1).step
     moment = state_at(effect, Clip(16, 9, rolling_repair.COUNT).stepped(steps), rolling_repair.FRAME)
     rows = np.linspace(-0.5, 0.5, 5) / effect.regions[0].moves.scale.at(1)
@@ -105,7 +106,7 @@ def test_time_maps_are_frames_put_together(name, times):
     source, effect = open_source(time_map.ITEM.footage(None)), recipe_file.load(HERE / f"{name}.json")
     height, width, shown = source.height, source.width, time_map.FRAME - 1
     renderer = Renderer(open_compositor(), source, MatteValues(width, height))
-    request = Request(shown, effect.for_picture(width / height).at(time_map.FRAME))
+    request = Request(shown, with_contents(effect.for_picture(width / height)).at(time_map.FRAME))
     made = light.to_encoded(renderer.picture(request)[..., :3]) * 255
     frames = np.stack([source.read(shown + k)[..., :3] for k in range(33)])
     time, (y, x) = times(height, width), np.mgrid[:height, :width]

@@ -123,6 +123,7 @@ def compose(found, plan: dict, folder):
     folder: of the recipe."""
     from test_composition import check, footage
 
+    from gallery.matte_contents import with_contents
     from shutter_addon.compute.renderer import Renderer, open_compositor
     from shutter_addon.compute.request import Request
     from shutter_addon.core.model.effect import FileContent
@@ -142,7 +143,7 @@ def compose(found, plan: dict, folder):
     channels = [shutter.bars.channel for shutter in found.shutters] + [each.moves.location for each in found.regions]
     keys = [frame for channel in channels if isinstance(channel, Keys) for frame in channel.frames]
     for frame in (1, 2.5, *keys[:2]):
-        moment = found.for_picture(SIZE[0] / SIZE[1], file).at(frame)
+        moment = with_contents(found.for_picture(SIZE[0] / SIZE[1]), file).at(frame)
         moment = replace(moment, options=replace(moment.options, step=1))  # footage of filmed frames alone
         renderers = [Renderer(device, source, values) for device in devices.values()]
         first, second = (renderer.coefficients(Request(3, moment)).astype(float) for renderer in renderers)

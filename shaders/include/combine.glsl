@@ -1,4 +1,4 @@
-// Combines frames other than by averaging; core/pixels/combined.py is the reference. COMBINE: 1 lightest, 2 darkest, 3
+// Combines frames other than by averaging; core/pixels/compositor.py is the reference. COMBINE: 1 lightest, 2 darkest, 3
 // median. For 1 and 2, `total` holds the best light so far and the largest wₖ aₖ; `share` the largest wₖ, a frame's weight
 // times `gain`. BY_LUMINANCE: all channels of a pixel come from one frame. THRESHOLD: light below (darkest: above)
 // `threshold.x`, with a soft edge of ± `threshold.y`, leaves no trail; the window's frame `shown` always counts.
@@ -10,7 +10,7 @@
 #  define WIDEST (LEVELS_OF == 0 ? 64.0 : 65536.0)
 #  define HIGHEST (LEVELS_OF == 0 ? 255.0 : LEVELS_OF == 1 ? 65535.0 : 262143.0)
 #  define STEPS 3
-// Within this of the middle, both neighbours count: MIDDLE of core/pixels/combined.py.
+// Within this of the middle, both neighbours count: MIDDLE of core/pixels/compositor.py.
 const float NEAR_MIDDLE = 1.0 / 8192.0;
 int scan = 0;
 float width_of_step = WIDEST;

@@ -1,5 +1,5 @@
-// A moment between two frames (core/frames/planes.py); media/flow.py is the reference. Places are whole numbers, so that
-// these are the same ones. A filmed pixel is a whole number, R + 256 G + 65536 B.
+// A moment between two frames (core/frames/frame_source.py); media/flow.py is the reference. Places are whole numbers, so
+// that these are the same ones. A filmed pixel is a whole number, R + 256 G + 65536 B.
 #define APART 4  // pixels between two vectors
 #define UNIT 32  // of a coordinate, in a pixel
 #define ZERO 32768

@@ -104,8 +104,8 @@ def padded(values: np.ndarray) -> np.ndarray:
 def table(state: FrameState) -> np.ndarray:
     """Return the table (1 + rows, columns, 4) float32 of shaders/include/compose.glsl.
 
-    Row 0 has the gains. For lightest and darkest, they scale the highest weight to 1 (core.pixels.combined); by value,
-    they are the shutters' mean times.
+    Row 0 has the gains. For lightest and darkest, they scale the highest weight to 1 (core.pixels.compositor); by
+    value, they are the shutters' mean times.
     By displacement, there is a row for each piece of the quantiles: starts, ends, then dz, the most by which the
     shutters' times differ at either, and z at its start. By value, there is a row of weights for each frame of the open
     span.

@@ -157,7 +157,7 @@ class CPUCompositor:
         if behind.plain is not None:
             picture = np.where((share[..., 3] > layering.UNCOVERED)[..., None], behind.plain, picture)
         for layer in layers:
-            picture = layering.laid_over(picture, layer.color, layer.share[..., 3])
+            picture = layer.color + (1 - layer.share[..., 3:]) * picture
         return self.over_black(picture) if levels else picture
 
     def draw(self, window: HostWindow, request: Request, coefficients: Coefficients) -> np.ndarray:

@@ -19,7 +19,7 @@ from ..core.pixels.shown_levels import Display
 from ..devices.device import Device, Given, NamedTextures, NoDeviceError, Texture
 from ..devices.llvmpipe import MOST_ITERATIONS, median_iterations
 from ..devices.passes import Pass, read_pass
-from . import cpu, window_frames
+from . import cpu
 from .composition_passes import (
     EDGES,
     LEVELS,
@@ -321,7 +321,7 @@ class GPUCompositor:
         """
         host, source, options = cpu.CPUCompositor(), window.source, request.state.options
         frames = host.window(source)
-        frames.load(window_frames.positions(request, window.shot), options, window.shot)
+        frames.load(request.positions(window.shot), options, window.shot)
         values = self.coefficients(coefficients.handle, len(request.state.bars))
         made = host.draw(frames, request, Coefficients(values, coefficients.block))
         frames.release()

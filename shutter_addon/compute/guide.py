@@ -13,8 +13,7 @@ import numpy as np
 
 from ..core.caches import LastValue
 from ..core.frames import light
-from ..core.frames.frame_source import FrameSource, SourceWrapper
-from ..core.frames.planes import Decoded, as_rgba
+from ..core.frames.frame_source import Decoded, FrameSource, SourceWrapper, as_rgba
 from ..core.messages import UserError
 from ..core.pixels.matte_grid import block_sums, blurred
 

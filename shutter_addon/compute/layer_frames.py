@@ -1,19 +1,22 @@
-"""Frames for the windows of layers: weighted pixel by pixel with a layer's matte, or with what all mattes leave. And
-the mattes of layers in source frames, each made once and cached."""
+"""Frames for the windows of layers: weighted pixel by pixel with a layer's matte, or with what all mattes leave.
+
+Also the mattes of layers in source frames, each made once and cached, and the colors of layers and of what lies behind
+them. And plates: what lies behind layers where no exposed frame shows it, taken from other frames or filled from
+around.
+"""
 
 from collections.abc import Callable, Hashable, Iterable
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ..core.caches import RecentValues
 from ..core.frames import light
-from ..core.frames.frame_source import FrameSource, SourceWrapper
-from ..core.frames.planes import Decoded
-from ..core.model.frame_state import FrameState, Layers
+from ..core.frames.frame_source import Decoded, FrameSource, Moment, Pair, SourceWrapper, as_rgba
+from ..core.model.frame_state import FrameState, Layers, Options
 from ..core.model.mattes import FileFrame, MatteReader, Ramp
-from ..core.pixels import layering
+from ..core.pixels import compositor, layering
 from ..core.stopping import kept
 
 # Bytes of cached frames, shared by all windows and mattes.
@@ -201,3 +204,234 @@ class LayerMattes:
         self._kept.clear()
         if self._reader is not None:
             self._reader.close()
+
+
+T = TypeVar("T")
+
+# Frames that are cached for windows, which load them one after another.
+TOGETHER = 4
+# The least of what lies behind that a pixel must show to be used in a plate.
+SEEN = 0.9
+# The weight of exposed pixels that are taken from other frames. It is a little less than 1, which would mean that no
+# layer was in the way (layering.UNCOVERED).
+TAKEN_SHARE = 1 - 1 / 64
+# Their largest weight, which is less than 1 in half floats, too.
+TAKEN_MOST = 1 - 1 / 1024
+# Kinds of pixels: seen, taken from another frame, filled from around.
+OPEN, TAKEN, FILLED = 0, 1, 2
+
+
+class LayerColors:
+    """Frames with the colors of a layer or of what lies behind, in the source's samples, and their weights.
+
+    Attributes:
+        layers: those of the last `begin`
+    """
+
+    layers: Layers
+    _options: Options
+    _shot: range
+
+    def __init__(self, source: FrameSource, recent: RecentFrames, mattes: LayerMattes) -> None:
+        self._source, self._recent, self._mattes = source, recent, mattes
+        self._kept: RecentValues[tuple, Any] = RecentValues()
+
+    def begin(self, layers: Layers, options: Options, shot: range) -> None:
+        """Set layers and options for the next frames. shot: the frames that may show what lies behind."""
+        self.layers, self._options, self._shot = layers, options, shot
+        self._kept.clear()
+
+    def changes(self, layer: int) -> tuple:
+        """Return a key of what `frames` changes in the source's frames. layer: −1: what lies behind all."""
+        return self._separates, self._options.plate_reach if layer < 0 and self._uncovers else None
+
+    def frames(self, layer: int) -> FrameSource:
+        """Return a source of frames with the colors of a layer, or with −1 of what lies behind all layers."""
+        if layer < 0 and self._uncovers:
+            return SourceWrapper(self._source, lambda frame: self._uncovered(frame)[0])
+        return SourceWrapper(self._source, partial(self._colors, layer)) if self._separates else self._source
+
+    @property
+    def has_moments(self) -> bool:
+        """Return whether moments lie between frames with colors of their own."""
+        return self._separates and self._source.step > 1
+
+    def weights(self, layer: int) -> Callable[[int], np.ndarray]:
+        """Return a function of a frame: how much (H, W) of a layer it shows, or with −1 of what lies behind all."""
+        if layer >= 0:
+            return lambda frame: self._mattes.one(self.layers, frame, layer)
+        if self._uncovers:
+            return lambda frame: self._uncovered(frame)[1]
+        return lambda frame: self._mattes.behind(self.layers, frame)
+
+    @property
+    def _separates(self) -> bool:
+        return self._options.decontaminate and self._source.alpha == "opaque"
+
+    @property
+    def _uncovers(self) -> bool:
+        return self.layers.camera is not None and self._source.alpha == "opaque"
+
+    def _memo(self, frame: int, name: Hashable, make: Callable[[], T]) -> T:
+        return self._kept.ask((frame, name), make, TOGETHER * (1 + len(self.layers.shutters)))
+
+    def _colors(self, layer: int, frame: int) -> Decoded:
+        """Return a frame with a layer's colors, or with −1 of what lies behind all. Moments lie between such frames."""
+        moment = self._source.decoded(frame)
+        if not isinstance(moment, Moment):
+            return self._separated(frame, layer)[int(layer < 0)]
+        ends = [number * self._source.step for number in moment.pair]
+
+        def between() -> Pair:
+            return moment.between.with_ends(*(self._separated(end, layer)[int(layer < 0)] for end in ends))
+
+        pair = self._memo(ends[0], (layer, ends[1]), between)
+        return pair.moment(moment.pair, moment.number, moment.steps)
+
+    def _separated(self, frame: int, layer: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return a frame with a layer's colors, and with those behind it. layer: −1: behind all."""
+        number = 0 if len(self.layers.shutters) == 1 else layer  # a single layer has all behind it
+        return self._memo(frame, number, lambda: self._separate(frame, number))
+
+    def _separate(self, frame: int, number: int) -> tuple[np.ndarray, np.ndarray]:
+        mattes = self._mattes.edges(self.layers, frame)
+        matte = 1 - layering.behind(mattes) if number < 0 else mattes[number]
+        picture, mixed = as_rgba(self._source.decoded(frame)), (matte > 0) & (matte < 1)
+        colors = linear(picture, self._source)[..., :3]
+        own, behind = (with_colors(picture, c, mixed, self._source) for c in layering.separated(colors, matte))
+        return own, behind
+
+    def _uncovered(self, frame: int) -> tuple[np.ndarray, np.ndarray]:
+        return self._memo(frame, "behind", lambda: self._uncover(frame))
+
+    def _uncover(self, frame: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return a frame of what lies behind layers, and its weights.
+
+        What layers cover comes from other frames, moved by the camera: where it pans, the frames that show a place are
+        no fair sample of the exposure.
+        """
+        picture = self._separated(frame, -1)[1] if self._separates else as_rgba(self._source.decoded(frame))
+        seen = self._mattes.behind(self.layers, frame)
+        lacking, kinds = plate(
+            seen < layering.UNCOVERED,
+            (other for other in nearest_frames(frame, self._options, self._shot) if other != frame),
+            self.linear_part,
+            partial(self._mattes.behind, self.layers),
+            partial(self.motion, frame),
+        )
+        colors, share = uncovered(linear(picture, self._source)[..., :3], seen, lacking, kinds)
+        return with_colors(picture, colors, kinds == TAKEN, self._source), share
+
+    def motion(self, frame: int, other: int) -> tuple[complex, complex]:
+        """Return how the camera's view moves from one frame to another."""
+        return self.layers.camera.between(frame, other) if self.layers.camera else (1, 0)
+
+    def linear_part(self, frame: int, part: tuple[slice, slice]) -> np.ndarray:
+        """Return rows and columns of a frame in linear light, premultiplied."""
+        return linear(self._recent.read(frame)[part], self._source)
+
+    def clear(self) -> None:
+        """Forget all frames."""
+        self._kept.clear()
+
+
+def nearest_frames(index: int, options: Options, shot: range) -> Iterable[int]:
+    """Return the shot's filmed frames in reach of frame `index`, in the order in which a plate uses them.
+
+    The nearest come first, of two the earlier one. Moments between them are made of these.
+    """
+    reach = options.plate_reach * options.step
+    near = range(max(index - reach, shot.start), min(index + reach + 1, shot.stop))
+    filmed = (frame for frame in near if frame % options.step == 0)
+    return sorted(filmed, key=lambda frame: (abs(frame - index), frame))
+
+
+def plate(
+    holes: np.ndarray,
+    frames: Iterable[int],
+    read: Callable[[int, tuple[slice, slice]], np.ndarray],
+    clear: Callable[[int], np.ndarray],
+    motion: Callable[[int], tuple[complex, complex]],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return what lies behind layers in the pixels `holes`.
+
+    Args:
+        holes: (H, W) bool
+        frames: source frames, in the order in which they are tried
+        read: returns rows and columns of a frame's picture
+        clear: returns how much (H, W) of what lies behind a frame shows
+        motion: returns where a point z of this picture lies in a frame: turn · z + shift
+
+    Returns:
+        A picture (H, W, 4) float32, scene-linear and premultiplied, and the kinds (H, W) uint8 of its pixels
+    """
+    height, width = holes.shape
+    picture, kinds = np.zeros((height, width, 4), np.float32), np.where(holes, FILLED, OPEN).astype(np.uint8)
+    rows, columns = np.nonzero(holes)
+    for frame in frames:
+        if not rows.size:
+            break
+        seen, (turn, shift) = clear(frame), motion(frame)
+        places = turn * (columns + 1j * rows) + shift
+        x, y = np.rint(places.real).astype(int), np.rint(places.imag).astype(int)
+        inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
+        found = inside & (seen[y.clip(0, height - 1), x.clip(0, width - 1)] >= SEEN)
+        if found.any():
+            at = rows[found], columns[found]
+            top, left = max(y[found].min() - 2, 0), max(x[found].min() - 2, 0)
+            part = read(frame, (slice(top, y[found].max() + 3), slice(left, x[found].max() + 3)))
+            picture[at] = compositor.seen(part, places[found] - (left + 1j * top), sharp=False)
+            kinds[at] = TAKEN
+            rows, columns = rows[~found], columns[~found]
+    return picture, kinds
+
+
+def uncovered(colors: np.ndarray, seen: np.ndarray, plate: np.ndarray, kinds: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return what lies behind layers in a frame, completed from a plate.
+
+    Args:
+        colors: (H, W, 3), what the frame shows, scene-linear
+        seen: (H, W), how much of what lies behind it shows
+        plate: of `plate`, with holes where the frame does not show all
+        kinds: of `plate`
+
+    Returns:
+        Colors (H, W, 3), scene-linear, and their weights (H, W) float32
+    """
+    taken = kinds == TAKEN
+    mixed = seen[..., None] * colors + (1 - seen)[..., None] * plate[..., :3]
+    share = np.where(taken, np.minimum(seen + (1 - seen) * np.float32(TAKEN_SHARE), np.float32(TAKEN_MOST)), seen)
+    return np.where(taken[..., None], mixed, colors), share.astype(np.float32)
+
+
+def filled(picture: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Fill unknown pixels smoothly from their neighbors.
+
+    It uses a pyramid: each level is the mean of the known pixels of the finer one, which takes from it what it lacks.
+    The result resembles diffusion, with one pass for each level.
+
+    Args:
+        picture: (H, W, C) float32
+        known: (H, W) bool
+    """
+    if known.all() or min(known.shape) < 2:
+        return picture if known.any() else np.zeros_like(picture)
+    height, width = known.shape
+    pad = [(0, height % 2), (0, width % 2)]
+    weights = np.pad(known.astype(np.float32), pad)
+    colors = np.pad(np.where(known[..., None], picture, 0), [*pad, (0, 0)]).astype(np.float32)
+    halves = weights.shape[0] // 2, 2, weights.shape[1] // 2, 2
+    count = weights.reshape(halves).sum(axis=(1, 3))
+    mean = colors.reshape(*halves, -1).sum(axis=(1, 3)) / np.maximum(count, 1)[..., None]
+    coarse = filled(mean, count > 0)
+    return np.where(known[..., None], picture, _doubled(coarse)[:height, :width])
+
+
+def _doubled(picture: np.ndarray) -> np.ndarray:
+    """Return the picture at twice its size, linear between the centers of pixels."""
+    for axis in (0, 1):
+        count = picture.shape[axis]
+        own = np.arange(count).repeat(2)
+        beside = (own + np.tile((-1, 1), count)).clip(0, count - 1)
+        picture = 0.75 * picture.take(own, axis) + 0.25 * picture.take(beside, axis)
+    return picture.astype(np.float32)

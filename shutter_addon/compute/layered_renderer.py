@@ -11,9 +11,8 @@ from ..core.frames.frame_source import FrameSource
 from ..core.model.frame_state import FrameState, Layers
 from ..core.model.mattes import MatteReader
 from ..core.pixels import layering
-from . import plates, window_frames
+from . import layer_frames
 from .guide import Guides, NotedSource
-from .layer_frames import LayerMattes, RecentFrames, WeightedFrames
 from .request import Behind, Coefficients, Compositor, Exposure, Handle, Request, Stages
 from .window import summable
 
@@ -45,11 +44,11 @@ class LayeredRenderer:
         solve: Callable[[FrameSource, FrameState, int], np.ndarray],
     ) -> None:
         self._compositor, self._stages, self._source = compositor, stages, source
-        self.recent = RecentFrames(source)
+        self.recent = layer_frames.RecentFrames(source)
         noted = NotedSource(self.recent, guides)
         size = source.width, source.height
-        self.mattes = LayerMattes(size, lambda state, frame: solve(self.recent, state, frame), mattes)
-        self._colors = plates.LayerColors(noted, self.recent, self.mattes)
+        self.mattes = layer_frames.LayerMattes(size, lambda state, frame: solve(self.recent, state, frame), mattes)
+        self._colors = layer_frames.LayerColors(noted, self.recent, self.mattes)
         self._layers: Layers | None = None
         self._windows: dict[tuple, Handle] = {}
         self._loaded: dict[tuple[int, int], tuple] = {}  # keys of frames (f, f), and camera motions (f, g)
@@ -132,15 +131,15 @@ class LayeredRenderer:
             for other in [other for other in self._windows if other[:2] == name]:
                 self._windows.pop(other).release()
             frames, weights = self._colors.frames(layer), self._colors.weights(layer)
-            weighted = WeightedFrames(frames, weights, rest=layer < 0, alone=alone, colored=has_threshold)
+            weighted = layer_frames.WeightedFrames(frames, weights, rest=layer < 0, alone=alone, colored=has_threshold)
             window = self._windows[key] = self._compositor.window(weighted, options.window, moved, shutters, summed)
         return window
 
     def _load(self, windows: dict, request: Request, shot: range) -> None:
         """Load all windows, a few frames at a time, so that each frame is read once for all windows."""
-        options, ordered = request.state.options, np.sort(window_frames.positions(request, shot))
-        lacking = window_frames.exposed_frames(request, shot).difference(self.held)
-        step = plates.TOGETHER if len(lacking) > 1 else len(ordered)
+        options, ordered = request.state.options, np.sort(request.positions(shot))
+        lacking = request.exposed_frames(shot).difference(self.held)
+        step = layer_frames.TOGETHER if len(lacking) > 1 else len(ordered)
         for end in range(step, len(ordered) + step, step):
             for window in windows.values():
                 window.load(ordered[:end], options, shot)
@@ -181,20 +180,20 @@ class LayeredRenderer:
         holes &= layering.behind([self._shares(layer) for layer in own]) > _SEEN
         if not holes.any():
             return None
-        picture, kinds = plates.plate(
+        picture, kinds = layer_frames.plate(
             holes,
-            plates.nearest_frames(request.index, request.state.options, shot),
+            layer_frames.nearest_frames(request.index, request.state.options, shot),
             self._colors.linear_part,
             lambda frame: self.mattes.behind(layers, frame),
             lambda frame: self._colors.motion(request.index, frame),
         )
         picture[..., :3] *= gain()[..., None]
-        if (kinds == plates.FILLED).any():
-            shares, is_open = self._shares(bottom), kinds == plates.OPEN
+        if (kinds == layer_frames.FILLED).any():
+            shares, is_open = self._shares(bottom), kinds == layer_frames.OPEN
             around = layering.with_plate(self._compositor.read(bottom.color), shares, None)
             # Nothing is known where a layer hides everything.
-            known = np.where(is_open, shares >= layering.CLEAR, kinds == plates.TAKEN)
-            picture = plates.filled(np.where(is_open[..., None], around, picture), known)
+            known = np.where(is_open, shares >= layering.CLEAR, kinds == layer_frames.TAKEN)
+            picture = layer_frames.filled(np.where(is_open[..., None], around, picture), known)
         if self._source.alpha == "opaque":
             picture[..., 3] = 1  # even if nothing is known
         return picture

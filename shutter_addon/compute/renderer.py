@@ -11,11 +11,11 @@ import numpy as np
 
 from ..core.caches import LastValue
 from ..core.frames.frame_source import FrameSource
-from ..core.model import scribbles
+from ..core.model import scribbles, windows
 from ..core.model.frame_state import FrameState
 from ..core.model.mattes import MatteReader
 from ..devices.device import Budget, NoDeviceError
-from . import guide, window_frames
+from . import guide
 from .cpu import CPUCompositor
 from .gpu import GPUCompositor
 from .layered_renderer import LayeredRenderer
@@ -23,6 +23,10 @@ from .request import Coefficients, Compositor, Handle, Request
 
 if TYPE_CHECKING:
     from ..devices.gl import GLDevice
+
+# Pictures whose frames are decoded in advance, and how many frames or bytes of them lie decoded at most, besides those
+# on the device: enough for a long window, whose frames are decoded while its first picture is diffused and compiled.
+_AHEAD, _DECODED, _DECODED_BYTES = 4, 8, 256 << 20
 
 
 def open_compositor(device: str = "gpu") -> Compositor:
@@ -193,14 +197,34 @@ class Renderer:
         return self._kept_labels.get((size, state.options.border, state.shapes_key), lambda: labelled(state, size))
 
     def shot(self, request: Request, *, known: bool = False) -> range:
-        """See window_frames.shot_of."""
-        return window_frames.shot_of(request, self.source, self._beside(request), known=known)
+        """Return the source frames that the window may show: those of the shot around the shown one.
+
+        It looks only for those ends of the shot that the window reaches; the clip's ends take the place of others.
+
+        Args:
+            known: Read no frame to look for cuts; only cuts that were found before count.
+        """
+        index, (low, high), shots = request.index, self._reach(request), self.source.shots
+        if shots is None or not request.state.options.stop_at_cuts:
+            return range(self.source.count)
+        shot = shots.around(index, low, high, known=known)
+        moved = windows.slid(request.state, index, request.direction, shot)
+        if moved is not request.state:
+            first, final = self._reach(replace(request, state=moved))
+            return shots.around(index, min(low, first), max(high, final), known=known)
+        last = shot.stop - 1
+        if request.state.options.edges == "mirror" and (last < high) != (shot.start > low):
+            # Frames mirrored at one end of the shot may lie beyond its other end.
+            low, high = (min(low, 2 * last - high), high) if last < high else (low, max(high, 2 * shot.start - low))
+            shot = shots.around(index, low, high, known=known)
+        return shot
 
     def slid(self, request: Request, *, known: bool = False) -> Request:
-        """See window_frames.slid."""
+        """Return the request with its exposure moved into the shot (edges "slide"), and edges "hold"."""
         if request.state.options.edges != "slide":
             return request
-        return window_frames.slid(request, self.shot(request, known=known))
+        state = windows.slid(request.state, request.index, request.direction, self.shot(request, known=known))
+        return replace(request, state=replace(state, options=replace(state.options, edges="hold")))
 
     def missing(self, request: Request) -> set[int]:
         """Return the source frames that `draw` would read: to expose them, to guide the diffusion, or to find cuts."""
@@ -212,9 +236,11 @@ class Renderer:
         request = self.slid(request, known=True)
         if request.state.layers is None:
             request = self._exposing(request, self.labels(request))
-        unread, handed = window_frames.looked_for_cuts(request, self.source, self._beside(request))
+        unread, handed, shots = set[int](), set[int](), self.source.shots
+        if shots is not None and request.state.options.stop_at_cuts:
+            unread, handed = shots.lacking(request.index, *self._reach(request)), shots.handed()
         shot = self.shot(request, known=True)
-        missing = window_frames.exposed_frames(request, shot).difference(held)
+        missing = request.exposed_frames(shot).difference(held)
         missing |= self._guides.lacking(self._guiding(request, shot))
         return (missing | unread) - handed
 
@@ -226,18 +252,26 @@ class Renderer:
             return self._layering().mattes.of(request.state.layers, request.index if frame is None else frame)
 
     def _want(self, request: Request) -> list[int]:
-        """See window_frames.want."""
-        return window_frames.want(
-            self.source, request.index, request.direction, lambda index: self.missing(replace(request, index=index))
-        )
+        """Have the frames decoded that a picture lacks, then those of the next pictures.
+
+        Returns:
+            The frames to be wanted once the picture is made; the others are on the device by then.
+        """
+        indices = (request.index + step * request.direction * self.source.step for step in range(_AHEAD + 1))
+        shown = (min(max(index, 0), self.source.count - 1) for index in indices)
+        lacking = [self.missing(replace(request, index=index)) for index in shown]
+        self.source.want(_in_order(self.source, lacking))
+        return _in_order(self.source, [frames - lacking[0] for frames in lacking[1:]])
 
     def _is_guided(self, request: Request) -> bool:
         """Return whether coefficients depend on the shown frame."""
         return request.state.options.edge_aware > 0 and sole_of(self.labels(request)) is None
 
-    def _beside(self, request: Request) -> int:
-        """See window_frames."""
-        return guide.reach(request.state.options.step) if self._is_guided(request) else 0
+    def _reach(self, request: Request) -> tuple[int, int]:
+        """Return the first and last position that any shutter exposes, that is shown, or that guides the diffusion."""
+        low, high = windows.reach(request.state, request.index, request.direction)
+        beside = guide.reach(request.state.options.step) if self._is_guided(request) else 0
+        return min(low, request.index - beside), max(high, request.index + beside)
 
     def _guiding(self, request: Request, shot: range) -> tuple[int, ...]:
         """Return the source frames that guide the diffusion (guide.guiding); none if nothing does."""
@@ -261,7 +295,7 @@ class Renderer:
         self._keep_guides(request)
         exposing = self._exposing(request, labels)
         shot = self.shot(exposing)
-        self._window.load(window_frames.positions(exposing, shot), exposing.state.options, shot)
+        self._window.load(exposing.positions(shot), exposing.state.options, shot)
         self.is_short = self._window.sends
         return self._window
 
@@ -280,7 +314,10 @@ class Renderer:
         if not request.state.options.edge_aware:
             self._guides.keep(())
         elif self._is_guided(request):  # else this may be a single frame between guided ones
-            self._guides.keep(window_frames.guided_later(request, self._beside(request)))
+            index, step, (low, high) = request.index, request.state.options.step, self._reach(request)
+            beside = guide.reach(step)
+            onwards = range(index - beside, high + 1) if request.direction > 0 else range(low, index + beside + 1)
+            self._guides.keep(i for i in onwards if i % step == 0 or i == index)
 
     def _coefficients(self, request: Request, labels: list[LabelLayer], count: int = 1) -> Coefficients:
         """Return coefficients for the composition. count: the shutters, if a single one holds everywhere."""
@@ -364,6 +401,12 @@ class Renderer:
             if reader is not None:
                 reader.close()
         self.source.close()
+
+
+def _in_order(source: FrameSource, lacking: list[set[int]]) -> list[int]:
+    wanted = dict.fromkeys(i for frames in lacking for i in sorted(frames))
+    most = _DECODED_BYTES // (source.width * source.height * 4 * source.dtype.itemsize)
+    return list(wanted)[: max(_DECODED, most)]
 
 
 def _sole(request: Request, labels: list[LabelLayer]) -> int | None:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, Protocol, TypeAlias
 import numpy as np
 
 from ..core.frames.frame_source import FrameSource
+from ..core.model import windows
 from ..core.model.frame_state import FrameState
 from ..core.model.mattes import Matte
 from ..core.pixels.shown_levels import Display
@@ -43,6 +44,23 @@ class Request:
     def key(self) -> tuple:
         """A key that is equal for the same picture, quick or not."""
         return self.source, self.index, self.direction, self.state.key, self.levels, self.display
+
+    def positions(self, shot: range) -> np.ndarray:
+        """Return the positions (core.model.windows.positions) that any shutter exposes, with or without a scribble.
+
+        If frames of them are missing (edges "shorten"), return all positions of the window that have a frame, since the
+        nearest one may take their place.
+        """
+        within = windows.positions(self.state.options, self.index, self.direction)
+        exposed = slice(*self.state.open_span)
+        if self.state.options.edges != "shorten":
+            return within[exposed]
+        frames = windows.source_frames(self.state.options, within, shot)
+        return within[exposed] if (frames[exposed] >= 0).all() else within[frames >= 0]
+
+    def exposed_frames(self, shot: range) -> set[int]:
+        """Return the source frames at `positions`."""
+        return set(windows.source_frames(self.state.options, self.positions(shot), shot).tolist())
 
 
 class Coefficients(NamedTuple):
@@ -127,7 +145,7 @@ class Compositor(Protocol):
 
     Attributes:
         name: the device's name
-        takes_planes: whether frames are fastest to send as planes (core.frames.planes)
+        takes_planes: whether frames are fastest to send as planes (core.frames.frame_source)
     """
 
     name: str

@@ -6,8 +6,7 @@ from collections.abc import Collection, Iterator
 
 import numpy as np
 
-from ..core.frames.frame_source import FrameSource
-from ..core.frames.planes import TILE, Moment, Planes, chroma_step
+from ..core.frames.frame_source import TILE, FrameSource, Moment, Planes, chroma_step
 from ..core.model import windows
 from ..core.model.frame_state import Light, Options
 from ..core.stopping import kept

@@ -135,7 +135,7 @@ class Device:
         max_size: the most texels along a texture's side
         max_layers: the most layers of a texture array
         budget: the memory of all textures on this GPU, shared with other devices on it
-        takes_planes: whether frames are fastest to send as planes (core.frames.planes), in r32ui textures
+        takes_planes: whether frames are fastest to send as planes (core.frames.frame_source), in r32ui textures
         ask_others: called when the budget is full; makes other devices free memory. None: there are none.
     """
 

@@ -10,8 +10,7 @@ import numpy as np
 
 from ..core.caches import RecentValues
 from ..core.frames import light
-from ..core.frames.frame_source import FrameSource, SourceWrapper
-from ..core.frames.planes import Decoded, Moment, Planes, as_rgba
+from ..core.frames.frame_source import Decoded, FrameSource, Moment, Planes, SourceWrapper, as_rgba
 from ..core.messages import MediaError
 
 # Frames on each side that decide about a cut. A film animated on threes has as many pictures there as PySceneDetect

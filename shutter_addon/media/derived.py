@@ -18,8 +18,7 @@ import numpy as np
 from OpenImageIO import ImageInput, ImageSpec, geterror
 
 from ..core import atomic_write
-from ..core.frames.frame_source import FrameSource
-from ..core.frames.planes import STEP
+from ..core.frames.frame_source import STEP, FrameSource
 from ..core.messages import MediaError
 from . import flow
 from .files import check_name
@@ -48,11 +47,7 @@ def identity(source: FrameSource) -> dict:
     for path in source.files:
         content.update(content_digest(path))
     known = {name: getattr(source, name) for name in ("count", "transfer", "alpha", "options")}
-    return known | {
-        "content": content.hexdigest(),
-        "size": [source.width, source.height],
-        "dtype": source.dtype.name,
-    }
+    return known | {"content": content.hexdigest(), "size": [source.width, source.height], "dtype": source.dtype.name}
 
 
 def key(made_of: dict) -> str:

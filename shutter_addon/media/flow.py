@@ -19,8 +19,7 @@ import numpy as np
 from ..core import stopping
 from ..core.caches import RecentValues
 from ..core.frames import light
-from ..core.frames.frame_source import FrameSource
-from ..core.frames.planes import STEP, TILE, UNIT, ZERO, Moment
+from ..core.frames.frame_source import STEP, TILE, UNIT, ZERO, FrameSource, Moment
 from .opencv import cv2
 
 SMALLEST = 16  # pixels; OpenCV's flows need about as many, smaller pictures are cross-faded

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ..core.model.mattes import Content, FileFrame, Matte, MatteFile, MatteSource
+from ..core.frames.frame_source import FrameSource, SourceFile
+from ..core.model.mattes import Content, FileFrame, Matte
 from ..core.pixels.matte_grid import block_means, feathered, fitted
 
 # The most files that stay open.
@@ -31,7 +32,7 @@ class MatteValues:
                 None: it is carried.
         """
         self._size, self._step, self._late = (width, height), step, late
-        self._sources: dict[MatteFile, MatteSource] = {}
+        self._sources: dict[SourceFile, FrameSource] = {}
         self._made: list[tuple[Hashable, np.ndarray]] = []
 
     def another(self) -> MatteValues:

@@ -19,8 +19,7 @@ from av.video.reformatter import ColorRange, Interpolation, VideoReformatter
 from av.video.stream import VideoStream
 from numpy.typing import DTypeLike
 
-from ..core.frames.frame_source import FrameSource
-from ..core.frames.planes import Decoded, Matrix, Planes, as_rgba, matrix
+from ..core.frames.frame_source import Decoded, FrameSource, Matrix, Planes, as_rgba, matrix
 from ..core.messages import MediaError
 from .decode import FrameReader, fraction, reason
 from .files import check_file, check_index

@@ -131,7 +131,7 @@ class MatteFile:
     stamp: Hashable = None
 
     def open(self) -> SourceWrapper:
-        """Open the matte's frames (core.model.mattes.MatteSource), for one thread at a time.
+        """Open the matte's frames (core.frames.frame_source.SourceFile), for one thread at a time.
 
         Each frame is a new array of the stored samples: without a transfer function or color space, with alpha neither
         multiplied nor divided. A movie's range is expanded to 0 … 1, NaN becomes 0. Luminance has Rec.709's weights.

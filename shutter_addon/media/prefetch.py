@@ -7,8 +7,7 @@ from functools import partial
 import numpy as np
 
 from ..core import stopping, threads
-from ..core.frames.frame_source import FrameSource, SourceWrapper
-from ..core.frames.planes import Decoded, as_rgba
+from ..core.frames.frame_source import Decoded, FrameSource, SourceWrapper, as_rgba
 from ..core.messages import MediaError
 
 _PATIENCE = 0.1  # seconds between two looks at whether a frame is still wanted

@@ -7,7 +7,7 @@ import pytest
 from test_composition import SHAPES, check, footage, state
 
 from shutter_addon.core.model.frame_state import Combine, Following
-from shutter_addon.core.pixels import combined
+from shutter_addon.core.pixels import compositor
 
 LIGHTEST, DARKEST, MEDIAN = (Combine(mode) for mode in ("lightest", "darkest", "median"))
 MODES = {
@@ -57,7 +57,7 @@ def test_a_median_is_continuous():
     """Between the samples beside the middle, as their weights change by a little."""
     values = np.array([0.0, 1.0])
     shares = np.linspace(0.49, 0.51, 4001)
-    found = combined.weighted_median(np.broadcast_to(values[:, None], (2, 4001)), np.stack([shares, 1 - shares]))
+    found = compositor.weighted_median(np.broadcast_to(values[:, None], (2, 4001)), np.stack([shares, 1 - shares]))
     assert found[0] == 1
     assert found[-1] == 0
     assert found[2000] == pytest.approx(0.5, abs=1e-6)

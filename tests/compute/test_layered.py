@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from test_composition import LEVEL, Footage, footage, state
 
-from shutter_addon.compute import plates
+from shutter_addon.compute import layer_frames
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer, open_compositor, open_gl
 from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
-from shutter_addon.core.frames.planes import as_rgba
+from shutter_addon.core.frames.frame_source import as_rgba
 from shutter_addon.core.model import windows
 from shutter_addon.core.model.frame_state import Following, FrameState, Layers, Options
 from shutter_addon.core.model.mattes import FileFrame, Matte
@@ -244,13 +244,13 @@ def test_frames_are_uncovered_anew_where_others_change_that_they_are_taken_from(
 
 def test_a_played_frame_uncovers_one(monkeypatch):
     """Of those whose covered places are taken from others, while the camera's keys and mattes stay."""
-    uncovered, done = plates.uncovered, []
+    uncovered, done = layer_frames.uncovered, []
 
     def counted(*given):
         done.append(given)
         return uncovered(*given)
 
-    monkeypatch.setattr(plates, "uncovered", counted)
+    monkeypatch.setattr(layer_frames, "uncovered", counted)
     rng = np.random.default_rng(17)
     source, matte = footage(rng, 60, SIZE), np.zeros((60, *SIZE[::-1]))
     matte[:, 8:15, 6:14] = 0.5
@@ -351,6 +351,6 @@ def test_a_taken_pixel_never_counts_as_if_no_layer_was_in_the_way():
     """Windows of layers keep weights in half floats, which must not round its share up to a whole one."""
     seen = np.linspace(0, 1, 2001, dtype=np.float32)[None]
     colors, plate = np.zeros((*seen.shape, 3), np.float32), np.ones((*seen.shape, 4), np.float32)
-    kinds = np.full(seen.shape, plates.TAKEN)
-    _, share = plates.uncovered(colors, seen, plate, kinds)
+    kinds = np.full(seen.shape, layer_frames.TAKEN)
+    _, share = layer_frames.uncovered(colors, seen, plate, kinds)
     assert share.astype(np.float16).max() < layering.UNCOVERED

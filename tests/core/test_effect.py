@@ -9,6 +9,7 @@ from shutter_addon.core.messages import EffectError
 from shutter_addon.core.model import effect, limits, mattes
 from shutter_addon.core.model.frame_state import Options
 from shutter_addon.core.model.keyframes import Bars, Constant, Keys, Samples, SourceTime
+from shutter_addon.core.model.motions import Placement
 
 FIRST, LAST = np.array([1.0, 0, 0, 0]), np.array([0, 0, 0, 1.0])
 
@@ -64,7 +65,7 @@ def changed(drawn=(1.0,), placement=None, **channels) -> effect.Effect:
         {"scale": keyed(1, 2)},
         {"drawn": (1.0, 5.0)},
         {"placement": Samples({1: np.eye(3), 3: np.diag([0.5, 0.5, 1])})},
-        {"content": Samples({i: mattes.Ramp("linear", (i, 0), 0.0, 1.0) for i in (1, 3)})},
+        {"content": Samples({i: mattes.Ramp("linear", Placement((i, 0))) for i in (1, 3)})},
         {"content": effect.placed_ramp("linear", effect.Moves(rotation=keyed(0.0, 90.0)))},
         {"opacity": keyed(1.0, 0.5)},
         {"feather": keyed(0.0, 0.5)},

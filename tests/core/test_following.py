@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from made_recipes import key
 
-from shutter_addon.core.model import following
 from shutter_addon.core.model.clip import Clip
 from shutter_addon.core.model.keyframes import Constant
-from shutter_addon.core.model.state_at import state_at
+from shutter_addon.core.model.state_at import smoothing, state_at
 
 SOURCE = Clip(width=64, height=48, count=40)
 
@@ -63,7 +62,7 @@ def test_smoothing_is_the_weighted_mean_of_the_frames_around():
     jump = [key(10, ease="constant"), key(20, (0.5, 0))]
     source = with_way(made(jump, "center"), follow_smooth=3)
     found = shifts(source, [19], frame=17, index=16, shown=lambda f: int(f) - 1)
-    weights = following.smoothing(3)
+    weights = smoothing(3)
     # At frame 20 those from 20 on count, of 17 to 23; at frame 17 the last of 14 to 20.
     assert found[0] == pytest.approx(32 * (weights[3:].sum() - weights[-1]))
 

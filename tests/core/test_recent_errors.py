@@ -31,7 +31,7 @@ def test_an_error_is_kept_once_as_the_line_that_made_it_and_the_oldest_go(tmp_pa
     with pytest.raises(RecipeError):
         recipe_file.load(tmp_path / "Qanarix.json")
     inner, outer = recent_errors.last()
-    assert 'raise RecipeError(f"{place}: {message}") [core/recipes/recipe_check.py:' in inner
+    assert 'raise RecipeError(f"{place}: {message}") [core/recipes/recipe_file.py:' in inner
     assert 'raise RecipeError(f"{path}: {error}") from None [core/recipes/recipe_file.py:' in outer
     missing(tmp_path)
     assert outer in recent_errors.last()

@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_recipes import comes_back, is_same, key, made
 
-from shutter_addon.core.model import limits, mattes, scribbles, shutters, windows
+from gallery.matte_contents import with_contents
+from shutter_addon.core.model import limits, mattes, motions, scribbles, shutters, windows
 from shutter_addon.core.model.clip import Clip
 from shutter_addon.core.model.keyframes import between_bars, eased_span
 from shutter_addon.core.model.state_at import state_at
@@ -40,14 +41,14 @@ def test_mattes_and_ramps():
     regions += [RAMP | {"ramp": "luminance"}]
     parsed = recipe_file.parse(json.dumps(EXAMPLE | {"regions": regions}))
     assert comes_back(parsed)
-    moment = parsed.for_picture(1, lambda region: type(region.content).__name__).at(3)
+    moment = with_contents(parsed.for_picture(1), lambda region: type(region.content).__name__).at(3)
     assert len(moment.shapes) == 1
     of_source, of_timeline, ramp, luminance = moment.mattes
     assert of_source == mattes.Matte(1, mattes.FileFrame("FileContent"), "add", invert=True)
     assert of_timeline == mattes.Matte(1, mattes.FileFrame("FileContent", 4, 2), feather=0.1)
-    assert ramp.content == mattes.Ramp("linear", (0.1, 0), 45, 1.5)
+    assert ramp.content == mattes.Ramp("linear", motions.Placement((0.1, 0), 45, 1.5))
     assert luminance.content == mattes.FileFrame("RampContent")
-    first = parsed.for_picture(1).at(1)
+    first = with_contents(parsed.for_picture(1)).at(1)
     assert len(first.mattes) == 3  # one of no opacity is none
 
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shutter_addon.core.model import trails
+from shutter_addon.core.model import state_at
 from shutter_addon.core.model.frame_state import Options
 
 OPEN = [1] * 8
@@ -16,7 +16,7 @@ def exposed(bars, speed=1.0, direction=1, here=100.0, after=None, before=None, *
     before = here - direction * speed if before is None else before
     after = here + direction * speed if after is None else after
     options = Options(len(bars), backward=direction < 0, **options)
-    return trails.on_timeline(np.array(bars, float), options, np.array([before, here, after]))
+    return state_at.on_timeline(np.array(bars, float), options, np.array([before, here, after]))
 
 
 def test_as_it_was_filmed_and_slower_it_is_the_shown_frame():

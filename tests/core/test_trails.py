@@ -10,8 +10,7 @@ from made_recipes import key, made
 from shutter_addon.core.model import windows
 from shutter_addon.core.model.clip import Clip
 from shutter_addon.core.model.keyframes import Constant
-from shutter_addon.core.model.state_at import state_at
-from shutter_addon.core.model.trails import with_length
+from shutter_addon.core.model.state_at import state_at, with_length
 from shutter_addon.core.pixels import compositor
 
 WINDOW = 24

@@ -259,6 +259,7 @@ def nudged(asked):
 
 def asked_of(case: Case, source, folder: Path):
     """The Request for the case's frame, as a render session makes it."""
+    from gallery.matte_contents import with_contents
     from shutter_addon.compute.request import Request
     from shutter_addon.core.frames.retiming import StripTiming
     from shutter_addon.core.model.clip import Clip
@@ -266,7 +267,7 @@ def asked_of(case: Case, source, folder: Path):
     from shutter_addon.core.recipes import recipe_file
 
     recipe = recipe_file.parse(case.recipe)
-    effect = recipe.for_picture(source.width / source.height, partial(matte_file, folder, source))
+    effect = with_contents(recipe.for_picture(source.width / source.height), partial(matte_file, folder, source))
     way = case.direction * case.index / source.step
     timing = StripTiming(
         name="Footage",

@@ -10,10 +10,10 @@ from cases import make_smooth
 from compare import open_devices
 from test_differential import MIXED, each_difference
 
-from shutter_addon.compute import cpu, gpu, plates
+from shutter_addon.compute import cpu, gpu, layer_frames
 from shutter_addon.core.frames import light
-from shutter_addon.core.model import following, keyframes, mattes, scribbles, shutters, trails, windows
-from shutter_addon.core.pixels import combined, compositor, layering
+from shutter_addon.core.model import keyframes, mattes, scribbles, shutters, state_at, windows
+from shutter_addon.core.pixels import compositor, layering
 from shutter_addon.devices import gl
 from shutter_addon.media import matte_values
 
@@ -29,9 +29,9 @@ FAULTS = {
     "no displacement": (shutters, "displace", shutters.mix),
     "another curve": (light, "to_linear", lambda code: np.sign(code) * np.abs(code) ** 2.2),
     "an edge twice": (windows, "source_frames", lambda *given: twice(*given)),
-    "nothing followed": (following, "followed", lambda effect, state, *_: state),
+    "nothing followed": (state_at, "followed", lambda effect, state, *_: state),
     "a dull filter": (compositor, "seen", lambda frame, places, sharp: seen(frame, places, sharp=False)),
-    "trails of no length": (trails, "with_length", lambda bars, *_: bars),
+    "trails of no length": (state_at, "with_length", lambda bars, *_: bars),
     "edges passed over": (
         cpu.CPUCompositor,
         "solve",
@@ -46,9 +46,9 @@ FAULTS = {
         lambda ramp, *size: ramp_values(replace(ramp, rotation=0), *size),
     ),
     "ghosts": (layering, "behind", lambda values: np.ones_like(values[0])),
-    "what a camera pans over": (plates, "uncovered", lambda colors, seen, *_: (colors, seen)),
-    "the mean for the median": (combined, "weighted_median", lambda values, weights: mean(values, weights)),
-    "thresholds that let all pass": (combined, "passes", lambda combine, luminance: np.ones_like(luminance)),
+    "what a camera pans over": (layer_frames, "uncovered", lambda colors, seen, *_: (colors, seen)),
+    "the mean for the median": (compositor, "weighted_median", lambda values, weights: mean(values, weights)),
+    "thresholds that let all pass": (compositor, "passes", lambda combine, luminance: np.ones_like(luminance)),
     "soft scribbles": (layering, "matte_of", lambda values: values),
     "nothing slides": (windows, "slid", lambda state, *_, **__: state),
     "not normalised": (windows, "source_frames", lambda options, places, shot: places.clip(0, shot.stop - 1)),

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from shutter_addon.core.frames import light
-from shutter_addon.core.frames.planes import as_rgba
+from shutter_addon.core.frames.frame_source import as_rgba
 from shutter_addon.media import flow, open_source
 
 HEIGHT, WIDTH = 96, 160

@@ -8,7 +8,7 @@ import pytest
 
 from shutter_addon.compute.renderer import open_gl
 from shutter_addon.compute.running_sums import Sums
-from shutter_addon.core.frames.planes import Planes
+from shutter_addon.core.frames.frame_source import Planes
 from shutter_addon.core.model.frame_state import Options
 from shutter_addon.devices.device import NoDeviceError
 from shutter_addon.media import open_source

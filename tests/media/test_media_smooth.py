@@ -11,7 +11,7 @@ import pytest
 from test_media_flow import blocks, frame, off, pan
 from test_media_steps import Film, shift
 
-from shutter_addon.core.frames.planes import as_rgba
+from shutter_addon.core.frames.frame_source import as_rgba
 from shutter_addon.core.model.shutters import MAX_WINDOW
 from shutter_addon.features.smooth import smooth
 from shutter_addon.features.smooth.smooth import SmoothSource, steps_for

@@ -7,7 +7,7 @@ import pytest
 from test_media_flow import pan
 from test_media_smooth import Panned
 
-from shutter_addon.core.frames.planes import as_rgba
+from shutter_addon.core.frames.frame_source import as_rgba
 from shutter_addon.features.smooth.smooth import SmoothSource
 from shutter_addon.media import MediaError, derived, flow
 from shutter_addon.media.derived import StoredVectors

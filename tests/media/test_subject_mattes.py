@@ -13,8 +13,8 @@ from test_carrying import Footage
 from shutter_addon.core.messages import MediaError
 from shutter_addon.core.model import outlines
 from shutter_addon.features.outlines import subject_mattes
-from shutter_addon.features.outlines.subject import MODEL, Network
-from shutter_addon.features.outlines.subject_mattes import CarriedFile, MarkedSubject
+from shutter_addon.features.outlines.subject_mattes import CarriedFile, MarkedSubject, Network
+from shutter_addon.media.files import MODEL
 
 WIDTH, HEIGHT, COUNT = 240, 160, 5
 GROUND = cv2.resize(np.random.default_rng(1).integers(90, 130, (12, 40, 3), np.uint8), (2 * WIDTH, HEIGHT))

@@ -19,7 +19,7 @@ from ... import features
 from ...core.frames.retiming import StripTiming
 from ...core.messages import EffectError, UserError, translated
 from ...core.model import effect as model
-from ...core.model import following, keyframes, limits, mattes, outlines
+from ...core.model import keyframes, limits, mattes, outlines, state_at
 from ...core.model.fields import fields_of
 from ...core.model.frame_state import Options
 from ...core.recipes import key_fitting
@@ -120,7 +120,7 @@ def _around(effect: PropertyGroup, frames: Frames, has_layers: bool) -> Frames:
     """Return the frames at which motions are needed: with those around where a shutter follows or a layer fills in."""
     if has_layers or any(shutter.follow != "NOTHING" for shutter in effect.shutters):
         smooth = max(validation.number(shutter, "follow_smooth") for shutter in effect.shutters)
-        reach = following.reach(validation.number(effect, "window")) + smooth
+        reach = state_at.reach(validation.number(effect, "window")) + smooth
         if has_layers:
             reach += validation.number(effect, "plate_reach") + 1
     elif any(shutter.length == "TIMELINE" for shutter in effect.shutters):

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import bpy
 
 from ... import features
-from ...core.model.mattes import MatteFile
+from ...core.frames.frame_source import SourceFile
 from ...core.pixels.shown_levels import Display
 from ..devices import available, main_thread
 from . import render_job, render_settings
@@ -47,7 +47,7 @@ def _ask_offscreen() -> None:
         SESSIONS.offscreen.free()
 
 
-def _want_matte(file: MatteFile, frame: int) -> None:
+def _want_matte(file: SourceFile, frame: int) -> None:
     """Have a matte made that a preview misses."""
     features.needed("want_matte")(file, frame)
 

@@ -6,23 +6,14 @@ import math
 from bisect import bisect_left
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
 from ..frames import retiming
+from ..frames.frame_source import FrameSource
 from ..frames.retiming import StripTiming
 from .keyframes import Channel
-
-
-class Medium(Protocol):
-    """The properties of a clip that footage or a matte's source provides."""
-
-    width: int
-    height: int
-    count: int
-    step: int
-    fps: Fraction | None
 
 
 class Shown(NamedTuple):
@@ -53,8 +44,8 @@ class Clip:
     timing: StripTiming | Channel | None = None
 
     @staticmethod
-    def of(medium: Medium, timing: StripTiming | Channel | None = None) -> Clip:
-        return Clip(medium.width, medium.height, medium.count, medium.step, medium.fps, timing)
+    def of(source: FrameSource, timing: StripTiming | Channel | None = None) -> Clip:
+        return Clip(source.width, source.height, source.count, source.step, source.fps, timing)
 
     def stepped(self, factor: int) -> Clip:
         """Return the clip with `factor` moments per filmed frame."""

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from itertools import pairwise
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from ..messages import EffectError
 from . import keyframes, limits, mattes, motions, outlines, scribbles, shutters
 from .choices import BETWEEN, BLENDS, CHANNELS, COMBINES, CONTEXT, LENGTHS, MOTIONS, RAMPS, TIMINGS
-from .fields import MISSING, choice, fixed, number, switch
+from .fields import MISSING, Labelled
 from .frame_state import EXTREMES, Combine, FrameState, Mode
 from .keyframes import Bars, Channel
 from .motions import Placement
@@ -115,16 +115,14 @@ class AnyRegion(Subject):
         drawings: The strokes; None for mattes and ramps.
     """
 
-    name: str = fixed("Name", "Name of the region", default="Region", absent="", most=limits.MAX_NAME)
+    name: str = Labelled("Name", "Name of the region").fixed(default="Region", absent="", most=limits.MAX_NAME)
     shutter: int
-    opacity: Channel = number(
-        "Opacity", "Influence of the region: 0 is like no region", default=1.0, subtype="FACTOR", told=False
+    opacity: Channel = Labelled("Opacity", "Influence of the region: 0 is like no region").number(
+        default=1.0, subtype="FACTOR", told=False
     )
-    layer: bool = switch(
-        "Layer",
-        "Expose the region separately, in front of everything else, so that it leaves no ghost",
-        blender="is_layer",
-    )
+    layer: bool = Labelled(
+        "Layer", "Expose the region separately, in front of everything else, so that it leaves no ghost"
+    ).switch(blender="is_layer")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -132,13 +130,8 @@ class Region(AnyRegion):
     """Strokes that give a shutter to what they touch (kind "line") or enclose ("lasso")."""
 
     kind: str
-    width: Channel = number(
-        "Width",
-        "Width of the lines as a fraction of the picture's height",
-        default=0.02,
-        most=limits.MAX_DISTANCE,
-        soft_most=0.5,
-        keyed_in_recipe=False,
+    width: Channel = Labelled("Width", "Width of the lines as a fraction of the picture's height").number(
+        default=0.02, most=limits.MAX_DISTANCE, soft_most=0.5, keyed_in_recipe=False
     )
     drawings: Drawings
 
@@ -156,25 +149,18 @@ class MatteRegion(AnyRegion):
     moves.
 
     Attributes:
-        content: Channel of mattes.Content.
+        content: Channel of mattes.Content; as a recipe names it, FileContent or RampContent.
         blend, invert, feather, opacity: See mattes.Matte.
     """
 
-    content: Channel
-    blend: mattes.Blend = choice(
-        "Blend", "How the matte combines with other regions", BLENDS, default="over", context=CONTEXT
+    content: Any
+    blend: mattes.Blend = Labelled("Blend", "How the matte combines with other regions").choice(
+        BLENDS, default="over", context=CONTEXT
     )
-    invert: bool = switch("Invert", "Give the shutter the pixels outside of the matte")
-    feather: Channel = number(
-        "Feather",
-        "Width of the matte's soft edges, as a fraction of the picture's height",
-        default=0.0,
-        most=limits.MAX_DISTANCE,
-        soft_most=0.2,
-        precision=3,
-        context=CONTEXT,
-        recipe="width",
-    )
+    invert: bool = Labelled("Invert", "Give the shutter the pixels outside of the matte").switch()
+    feather: Channel = Labelled(
+        "Feather", "Width of the matte's soft edges, as a fraction of the picture's height"
+    ).number(default=0.0, most=limits.MAX_DISTANCE, soft_most=0.2, precision=3, context=CONTEXT, recipe="width")
 
     def at(self, frame: float) -> mattes.Matte:
         """Return the matte at a frame."""
@@ -193,8 +179,8 @@ class OutlineRegion(MatteRegion):
     """
 
     drawings: Drawings
-    between: mattes.Between = choice(
-        "In Between", "How the outline changes between two drawings", BETWEEN, default="carried"
+    between: mattes.Between = Labelled("In Between", "How the outline changes between two drawings").choice(
+        BETWEEN, default="carried"
     )
 
     def drawn_at(self, frame: float) -> scribbles.Shape:
@@ -245,7 +231,7 @@ def drawn_outlines(drawings: Drawings) -> Channel:
 
 @dataclass(frozen=True)
 class FileContent:
-    """A matte file as a recipe names it. `Effect.for_picture` replaces it by a channel that can be read.
+    """A matte file as a recipe names it: not yet a channel that can be read.
 
     Attributes:
         path: A movie, or the first file of an image sequence, relative to the recipe's folder.
@@ -253,44 +239,30 @@ class FileContent:
     """
 
     path: str
-    channel: str = choice(
-        "Channel", "Channel of the matte that sets the amount of the shutter", CHANNELS, default="luminance", recipe=""
+    channel: str = Labelled("Channel", "Channel of the matte that sets the amount of the shutter").choice(
+        CHANNELS, default="luminance", recipe=""
     )
-    offset: int = fixed(
-        "Offset",
-        "Number of frames by which the matte plays ahead",
-        default=0,
-        least=-limits.MAX_FRAME,
-        most=limits.MAX_FRAME,
+    offset: int = Labelled("Offset", "Number of frames by which the matte plays ahead").fixed(
+        default=0, least=-limits.MAX_FRAME, most=limits.MAX_FRAME
     )
-    timing: Literal["source", "timeline"] = choice(
-        "Frames Of", "What the matte's frames are synchronized with", TIMINGS, default="source"
-    )
-
-    def at(self, _frame: float) -> mattes.FileFrame:
-        raise NotImplementedError
+    timing: Literal["source", "timeline"] = Labelled(
+        "Frames Of", "What the matte's frames are synchronized with"
+    ).choice(TIMINGS, default="source")
 
 
 @dataclass(frozen=True)
 class RampContent:
-    """A ramp as a recipe names it. `Effect.for_picture` replaces it by a channel that can be read."""
+    """A ramp as a recipe names it: not yet a channel that can be read."""
 
-    ramp: Literal["linear", "radial", "angle", "luminance"] = choice(
-        "Ramp", "Shape of the ramp", RAMPS, default="linear", absent=MISSING
+    ramp: Literal["linear", "radial", "angle", "luminance"] = Labelled("Ramp", "Shape of the ramp").choice(
+        RAMPS, default="linear", absent=MISSING
     )
-
-    def at(self, _frame: float) -> mattes.Ramp:
-        raise NotImplementedError
 
 
 def placed_ramp(kind: mattes.RampKind, moves: Moves) -> Channel:
     """Return a channel of mattes.Ramp that keys move."""
 
-    def at(frame: float) -> mattes.Ramp:
-        placed = moves.at(frame)
-        return mattes.Ramp(kind=kind, location=placed.location, rotation=placed.rotation, scale=placed.scale)
-
-    return keyframes.Computed(at)
+    return keyframes.Computed(lambda frame: mattes.Ramp(kind, moves.at(frame)))
 
 
 @dataclass(frozen=True)
@@ -301,14 +273,9 @@ class Camera(Subject):
         influence: 0 to 1, scales exposures that follow the camera. At 0 they show only the current frame.
     """
 
-    influence: Channel = number(
-        "Influence",
-        "Length of exposures that follow the camera: 0 exposes only the shown frame",
-        default=1.0,
-        subtype="FACTOR",
-        recipe="camera_influence",
-        told=False,
-    )
+    influence: Channel = Labelled(
+        "Influence", "Length of exposures that follow the camera: 0 exposes only the shown frame"
+    ).number(default=1.0, subtype="FACTOR", recipe="camera_influence", told=False)
 
 
 STILL_CAMERA = Camera(Moves())
@@ -318,60 +285,38 @@ STILL_CAMERA = Camera(Moves())
 class Shutter:
     """Bars over time, and how the exposed frames are combined. `follow`: what the exposure moves with."""
 
-    name: str = fixed("Name", "Name of the shutter", default="Shutter", absent=MISSING, most=limits.MAX_NAME)
-    color: tuple[float, float, float] = fixed(
-        "Color", "Color of the shutter's bars, scribbles and matte", default=(0.8, 0.8, 0.8), subtype="COLOR_GAMMA"
+    name: str = Labelled("Name", "Name of the shutter").fixed(default="Shutter", absent=MISSING, most=limits.MAX_NAME)
+    color: tuple[float, float, float] = Labelled("Color", "Color of the shutter's bars, scribbles and matte").fixed(
+        default=(0.8, 0.8, 0.8), subtype="COLOR_GAMMA"
     )
     bars: Bars
     follow: Subject | None = None
-    follow_motion: motions.Motion = choice(
-        "Motion", "Part of the motion that the exposure follows", MOTIONS, default="scale", context=CONTEXT, told=False
+    follow_motion: motions.Motion = Labelled("Motion", "Part of the motion that the exposure follows").choice(
+        MOTIONS, default="scale", context=CONTEXT, told=False
     )
-    follow_smooth: int = fixed(
-        "Smoothness",
-        "Frames on each side over which the motion is averaged, like that of a heavy camera",
-        default=0,
-        most=limits.MAX_SMOOTH,
-        soft_most=24,
-        told=False,
+    follow_smooth: int = Labelled(
+        "Smoothness", "Frames on each side over which the motion is averaged, like that of a heavy camera"
+    ).fixed(default=0, most=limits.MAX_SMOOTH, soft_most=24, told=False)
+    length: Literal["frames", "timeline", "motion"] = Labelled(
+        "Exposure Length", "What sets the length of the exposure"
+    ).choice(LENGTHS, default="frames", context=CONTEXT, recipe="")
+    trail: Channel = Labelled(
+        "Distance", "Distance of the motion while the shutter is open, as a fraction of the picture's height"
+    ).number(default=0.1, most=limits.MAX_DISTANCE, soft_most=1.0, precision=3, recipe="")
+    combine: Mode = Labelled("Combine", "How exposed frames are combined").choice(
+        COMBINES, default="average", told=False
     )
-    length: Literal["frames", "timeline", "motion"] = choice(
-        "Exposure Length", "What sets the length of the exposure", LENGTHS, default="frames", context=CONTEXT, recipe=""
-    )
-    trail: Channel = number(
-        "Distance",
-        "Distance of the motion while the shutter is open, as a fraction of the picture's height",
-        default=0.1,
-        most=limits.MAX_DISTANCE,
-        soft_most=1.0,
-        precision=3,
-        recipe="",
-    )
-    combine: Mode = choice("Combine", "How exposed frames are combined", COMBINES, default="average", told=False)
-    by_luminance: bool = switch(
-        "By Luminance", "Choose one frame per pixel by its luminance, not one per color channel", told=False
-    )
-    use_threshold: bool = switch(
-        "Use Threshold", "Let only light above the threshold leave trails, or with Darkest, below it", recipe=""
-    )
-    threshold: Channel = number(
-        "Threshold",
-        "Luminance in linear light from which light leaves a trail; white is 1",
-        default=0.5,
-        most=limits.MAX_THRESHOLD,
-        soft_most=1.0,
-        precision=3,
-        recipe="",
-    )
-    softness: Channel = number(
-        "Softness",
-        "Range of luminance around the threshold in which trails fade in",
-        default=0.1,
-        absent=0.0,
-        most=limits.MAX_THRESHOLD,
-        soft_most=1.0,
-        precision=3,
-        told=False,
+    by_luminance: bool = Labelled(
+        "By Luminance", "Choose one frame per pixel by its luminance, not one per color channel"
+    ).switch(told=False)
+    use_threshold: bool = Labelled(
+        "Use Threshold", "Let only light above the threshold leave trails, or with Darkest, below it"
+    ).switch(recipe="")
+    threshold: Channel = Labelled(
+        "Threshold", "Luminance in linear light from which light leaves a trail; white is 1"
+    ).number(default=0.5, most=limits.MAX_THRESHOLD, soft_most=1.0, precision=3, recipe="")
+    softness: Channel = Labelled("Softness", "Range of luminance around the threshold in which trails fade in").number(
+        default=0.1, absent=0.0, most=limits.MAX_THRESHOLD, soft_most=1.0, precision=3, told=False
     )
 
     @property
@@ -414,26 +359,6 @@ class Shutter:
         return Combine(self.combine, self.by_luminance, float(self.threshold.at(frame)), float(self.softness.at(frame)))
 
 
-MatteFiles = Callable[[MatteRegion], mattes.MatteFile]
-
-
-def _placed(region: Region | MatteRegion, aspect: float, files: MatteFiles) -> Region | MatteRegion:
-    """Return a recipe's region with a content that can be read."""
-    if region.drawings:
-        region = replace(region, drawings=replace(region.drawings, aspect=aspect))
-    if not isinstance(region, MatteRegion):
-        return region
-    if isinstance(region, OutlineRegion) and region.between == "straight":
-        return replace(region, content=drawn_outlines(region.drawings))
-    content = region.content
-    if isinstance(content, RampContent) and content.ramp != "luminance":
-        return replace(region, content=placed_ramp(content.ramp, region.moves))
-    frames = mattes.FileFrames(file=files(region))
-    if isinstance(content, FileContent):
-        frames = replace(frames, offset=content.offset, first=None if content.timing == "source" else 1)
-    return replace(region, content=frames)
-
-
 @dataclass(frozen=True)
 class Effect:
     """The whole effect, except for its source.
@@ -452,12 +377,10 @@ class Effect:
     regions: tuple[Region | MatteRegion, ...]
     options: Channel
     time: Channel | None = None
-    edge_aware: Channel = number(
+    edge_aware: Channel = Labelled(
         "Follow Edges",
         "How strictly scribbles stop at edges of the shown frame: at 1 they fill the object that they are on",
-        default=0.0,
-        subtype="FACTOR",
-    )
+    ).number(default=0.0, subtype="FACTOR")
     camera: Camera = STILL_CAMERA
     lost: EffectError | None = None
 
@@ -485,12 +408,13 @@ class Effect:
         shutters_ = tuple(replace(each, follow=each.follow and new[id(each.follow)]) for each in self.shutters)
         return replace(self, shutters=shutters_, regions=tuple(regions), camera=camera)
 
-    def for_picture(self, aspect: float, files: MatteFiles = lambda _region: mattes.NoFile()) -> Effect:
-        """Return the effect of a recipe for a picture of this width / height.
-
-        `files` gives the file of a matte, the source's luminance for a ramp, and the mattes of an outline or a subject.
-        """
-        return self.with_parts([_placed(region, aspect, files) for region in self.regions])
+    def for_picture(self, aspect: float) -> Effect:
+        """Return the effect of a recipe for a picture of this width / height."""
+        regions = [
+            replace(region, drawings=replace(region.drawings, aspect=aspect)) if region.drawings else region
+            for region in self.regions
+        ]
+        return self.with_parts(regions)
 
     def layers_at(self, frame: float) -> list[Region | MatteRegion]:
         """Return the visible layers at a frame, the farthest first."""

@@ -2,7 +2,7 @@
 
 The classes of the model (effect.py, frame_state.py) declare each property once, as a dataclass field:
 
-    trail: Channel = number("Distance", "How far …", default=0.1, most=MAX_DISTANCE)
+    trail: Channel = Labelled("Distance", "How far …").number(default=0.1, most=MAX_DISTANCE)
 
 Blender's property groups, recipes, the snapshot, import, export, validation, panels and the documentation's tables are
 derived from these. Bars, strokes and mattes have no Field; the code next to their subject handles them.
@@ -71,26 +71,45 @@ class Field:
 MISSING = dataclasses.MISSING
 
 
-def number(label: str, description: str, *, default: float, **more: Any) -> Any:
-    """Declare a number that keys can change; the model holds a channel."""
-    more = {"keyed": True, "is_channel": True, "keyed_in_recipe": True} | more
-    return fixed(label, description, default=default, made=lambda: Constant(default), **more)
+@dataclasses.dataclass(frozen=True)
+class Labelled:
+    """The texts of a property. Each method declares it as a field of a dataclass."""
+
+    label: str
+    description: str
+
+    def number(self, *, default: float, **more: Any) -> Any:
+        """Declare a number that keys can change; the model holds a channel."""
+        more = {"keyed": True, "is_channel": True, "keyed_in_recipe": True} | more
+        return self.fixed(default=default, made=lambda: Constant(default), **more)
+
+    def switch(self, *, default: bool = False, **more: Any) -> Any:
+        """Declare a boolean without keys."""
+        return self.fixed(default=default, **more)
+
+    def choice(self, choices: Sequence[Choice], *, default: str | int, **more: Any) -> Any:
+        """Declare a choice of one word, without keys."""
+        return self.fixed(default=default, choices=choices, **more)
+
+    def fixed(self, *, default: Any, made: Callable[[], Any] | None = None, **more: Any) -> Any:
+        """Declare a whole number, a text or a color, without keys; `made` makes the model's value, not `default`."""
+        said = {"label": self.label, "description": self.description, "default": default, "absent": default} | more
+        return dataclasses.field(default_factory=made or (lambda: default), metadata=said)
 
 
-def switch(label: str, description: str, *, default: bool = False, **more: Any) -> Any:
-    """Declare a boolean without keys."""
-    return fixed(label, description, default=default, **more)
+def switch(label: str, description: str, **more: Any) -> Any:
+    """See Labelled."""
+    return Labelled(label, description).switch(**more)
 
 
-def choice(label: str, description: str, choices: Sequence[Choice], *, default: str | int, **more: Any) -> Any:
-    """Declare a choice of one word, without keys."""
-    return fixed(label, description, default=default, choices=choices, **more)
+def choice(label: str, description: str, choices: Sequence[Choice], **more: Any) -> Any:
+    """See Labelled."""
+    return Labelled(label, description).choice(choices, **more)
 
 
-def fixed(label: str, description: str, *, default: Any, made: Callable[[], Any] | None = None, **more: Any) -> Any:
-    """Declare a whole number, a text or a color, without keys; `made` makes the model's value instead of `default`."""
-    said = {"label": label, "description": description, "default": default, "absent": default} | more
-    return dataclasses.field(default_factory=made or (lambda: default), metadata=said)
+def fixed(label: str, description: str, **more: Any) -> Any:
+    """See Labelled."""
+    return Labelled(label, description).fixed(**more)
 
 
 def fields_of(*kinds: type) -> dict[str, Field]:

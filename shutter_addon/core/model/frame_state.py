@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from . import limits, scribbles, shutters
 from .choices import AGGREGATES, CONTEXT, EDGES, EXPOSURES, INTERPOLATIONS, LIGHTS, POSITIONS, SMOOTH
-from .fields import MISSING, choice, fixed, switch
+from .fields import MISSING, Labelled
 from .mattes import Matte
 
 Interpolation = Literal["displacement", "value"]
@@ -25,7 +25,7 @@ Mode = Literal["average", "lightest", "darkest", "median"]
 
 @dataclass(frozen=True)
 class Combine:
-    """How the frames that a shutter exposes become one picture (core/pixels/combined.py).
+    """How the frames that a shutter exposes become one picture (core/pixels/compositor.py).
 
     Attributes:
         by_luminance: Lightest and darkest only: choose a pixel's frame by luminance, not per channel.
@@ -56,80 +56,46 @@ class Options:
         backward: Whether the source plays in reverse. A filmed frame is then the last of its moments.
     """
 
-    window: int = fixed(
-        "Frames",
-        "Number of source frames that a shutter can expose",
-        default=8,
-        absent=MISSING,
-        least=1,
-        most=shutters.MAX_WINDOW,
-        context=CONTEXT,
+    window: int = Labelled("Frames", "Number of source frames that a shutter can expose").fixed(
+        default=8, absent=MISSING, least=1, most=shutters.MAX_WINDOW, context=CONTEXT
     )
-    position: Position = choice(
-        "Position", "Position of the exposed frames relative to the shown frame", POSITIONS, default="start", keyed=True
+    position: Position = Labelled("Position", "Position of the exposed frames relative to the shown frame").choice(
+        POSITIONS, default="start", keyed=True
     )
-    interpolation: Interpolation = choice(
-        "Interpolation",
-        "How shutters blend, in the picture and between keyframes",
-        INTERPOLATIONS,
-        default="displacement",
-        keyed=True,
+    interpolation: Interpolation = Labelled(
+        "Interpolation", "How shutters blend, in the picture and between keyframes"
+    ).choice(INTERPOLATIONS, default="displacement", keyed=True)
+    light: Light = Labelled("Light", "How exposed frames are summed").choice(LIGHTS, default="linear", keyed=True)
+    exposure: Exposure = Labelled("Exposure", "Brightness of shutters that are open for different times").choice(
+        EXPOSURES, default="normalized", keyed=True, context=CONTEXT
     )
-    light: Light = choice("Light", "How exposed frames are summed", LIGHTS, default="linear", keyed=True)
-    exposure: Exposure = choice(
-        "Exposure",
-        "Brightness of shutters that are open for different times",
-        EXPOSURES,
-        default="normalized",
-        keyed=True,
-        context=CONTEXT,
+    edges: Edges = Labelled("Clip Ends", "How exposures continue beyond the ends of the clip or the shot").choice(
+        EDGES, default="hold", keyed=True, context=CONTEXT
     )
-    edges: Edges = choice(
-        "Clip Ends",
-        "How exposures continue beyond the ends of the clip or the shot",
-        EDGES,
-        default="hold",
-        keyed=True,
-        context=CONTEXT,
+    aggregate: int = Labelled("Matte Resolution", "Pixels that share a shutter (larger blocks are quicker)").choice(
+        AGGREGATES, default=1, keyed=True
     )
-    aggregate: int = choice(
-        "Matte Resolution", "Pixels that share a shutter (larger blocks are quicker)", AGGREGATES, default=1, keyed=True
-    )
-    border: bool = switch(
-        "Keep Edges Default",
-        "Give the picture's edge to the default shutter, so that a single stroke acts locally",
-        keyed=True,
-    )
-    stop_at_cuts: bool = switch(
-        "Stop at Cuts", "End exposures at cuts of the source, like at the clip's ends", default=True, keyed=True
-    )
+    border: bool = Labelled(
+        "Keep Edges Default", "Give the picture's edge to the default shutter, so that a single stroke acts locally"
+    ).switch(keyed=True)
+    stop_at_cuts: bool = Labelled(
+        "Stop at Cuts", "End exposures at cuts of the source, like at the clip's ends"
+    ).switch(default=True, keyed=True)
     edge_aware: float = 0.0
-    plate_reach: int = fixed(
+    plate_reach: int = Labelled(
         "Background Search",
         "Frames on each side that are searched for the background of layers, where no exposed frame shows it",
-        default=48,
-        most=limits.MAX_PLATE_REACH,
-        soft_most=120,
-    )
-    decontaminate: bool = switch(
-        "Clean Edges",
-        "Separate the colors of layers and their background in the mixed pixels at edges",
-        default=True,
-        keyed=True,
-    )
-    step: int = choice(
-        "Smooth",
-        "Also expose moments between filmed frames, found by optical flow, where both bars are open",
-        SMOOTH,
-        default=1,
-        blender="inbetween",
-        recipe="inbetween",
-    )
-    skip_repeats: bool = switch(
+    ).fixed(default=48, most=limits.MAX_PLATE_REACH, soft_most=120)
+    decontaminate: bool = Labelled(
+        "Clean Edges", "Separate the colors of layers and their background in the mixed pixels at edges"
+    ).switch(default=True, keyed=True)
+    step: int = Labelled(
+        "Smooth", "Also expose moments between filmed frames, found by optical flow, where both bars are open"
+    ).choice(SMOOTH, default=1, blender="inbetween", recipe="inbetween")
+    skip_repeats: bool = Labelled(
         "Skip Repeated Frames",
         "With Smooth, replace repeated frames by moments between their neighbors, as in 24 fps played at 30",
-        default=True,
-    )
+    ).switch(default=True)
     slid: int = 0
     backward: bool = False
 

@@ -12,9 +12,11 @@ from typing import Literal, Protocol
 
 import numpy as np
 
+from ..frames.frame_source import FrameSource, SourceFile
 from ..frames.retiming import StripTiming
-from .clip import Clip, Medium
+from .clip import Clip
 from .masks import MaskShape
+from .motions import Placement
 from .outlines import Curves, coverage
 
 Blend = Literal["over", "add"]
@@ -23,35 +25,6 @@ Between = Literal["carried", "straight"]
 RampKind = Literal["linear", "radial", "angle"]
 # The smallest scale of a ramp, which is almost a step.
 _SMALLEST = 1e-6
-
-
-class MatteFile(Hashable, Protocol):
-    """A movie, an image sequence or a picture with mattes. Files with the same values compare equal."""
-
-    def open(self) -> MatteSource:
-        """Open the file. MediaError: it cannot be read."""
-
-
-class MatteSource(Medium, Protocol):
-    """An opened MatteFile."""
-
-    def read(self, index: int) -> np.ndarray:
-        """Return the values (height, width) float32 of a frame, 0 to 1, top row first, clamped to the file's frames.
-
-        Raises:
-            MediaError: The frame cannot be read.
-        """
-
-    def close(self) -> None:
-        """Close the file."""
-
-
-@dataclass(frozen=True)
-class NoFile:
-    """A MatteFile without values, for a recipe whose folder is not known yet."""
-
-    def open(self) -> MatteSource:
-        raise NotImplementedError
 
 
 @dataclass(frozen=True)
@@ -64,12 +37,12 @@ class FileFrame:
         timing: A strip of the edit, which shows the file at the timeline frame `time`.
     """
 
-    file: MatteFile
+    file: SourceFile
     offset: int = 0
     time: float | None = None
     timing: StripTiming | None = None
 
-    def index(self, source: MatteSource, shown: int) -> int:
+    def index(self, source: FrameSource, shown: int) -> int:
         """Return the index in the opened file while the source shows the filmed frame `shown`; it may be out of range.
 
         Raises:
@@ -91,7 +64,7 @@ class FileFrames:
         timing: A strip of the edit that shows the file.
     """
 
-    file: MatteFile
+    file: SourceFile
     offset: int = 0
     first: float | None = None
     timing: StripTiming | None = None
@@ -111,22 +84,18 @@ class Ramp:
     the centre to the farthest corner. An angle goes once around the centre, clockwise from the top.
 
     Attributes:
-        location: (2,) fractions of the picture.
-        rotation: Degrees counter-clockwise.
-        scale: About the picture's centre.
+        placed: Where it lies, turned and scaled about the picture's centre.
     """
 
     kind: RampKind
-    location: tuple[float, float] = (0.0, 0.0)
-    rotation: float = 0.0
-    scale: float = 1.0
+    placed: Placement = Placement()
 
     def values(self, width: int, height: int) -> np.ndarray:
         """Return (height, width) float32, 0 to 1, top row first."""
-        scale = max(abs(self.scale), _SMALLEST)
-        x = np.arange(width) + 0.5 - width * (0.5 + self.location[0])
-        y = height * (0.5 - self.location[1]) - (np.arange(height)[:, None] + 0.5)
-        turn = math.radians(self.rotation) + (math.pi if self.scale < 0 else 0)
+        scale = max(abs(self.placed.scale), _SMALLEST)
+        x = np.arange(width) + 0.5 - width * (0.5 + self.placed.location[0])
+        y = height * (0.5 - self.placed.location[1]) - (np.arange(height)[:, None] + 0.5)
+        turn = math.radians(self.placed.rotation) + (math.pi if self.placed.scale < 0 else 0)
         cos, sin = math.cos(turn), math.sin(turn)
         along, across = x * cos + y * sin, y * cos - x * sin
         if self.kind == "angle":

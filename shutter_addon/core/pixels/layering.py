@@ -47,11 +47,6 @@ def behind(mattes: Sequence[np.ndarray]) -> np.ndarray:
     return reduce(np.multiply, [1 - matte for matte in mattes])
 
 
-def laid_over(under: np.ndarray, color: np.ndarray, cover: np.ndarray) -> np.ndarray:
-    """Compose a layer's F (H, W, 4), premultiplied, with its A (H, W), over a picture (H, W, 4)."""
-    return color + (1 - cover[..., None]) * under
-
-
 def with_plate(sums: np.ndarray, clear: np.ndarray, plate: np.ndarray | None) -> np.ndarray:
     """Return B (H, W, 4) from Σ qₖ hₖ Vₖ (H, W, 4) and Σ qₖ hₖ (H, W), filled by the plate where that is small."""
     if plate is None:

@@ -147,7 +147,7 @@ def _bars(effect: Effect, index: int, interpolation: Interpolation, shown: range
             apart = abs(sampled.share.at(frame) - share) * np.ptp(ends, axis=0).max()
         return bool(apart <= TOLERANCE * ends.max())
 
-    eased = _keys(fits, sampled.keys, [frame for frame, _ in sampled.keys], {}, shown)
+    eased = _keys(fits, dict(sampled.keys), {}, shown)
     return Bars(_keyed(eased, short, shown))
 
 
@@ -173,8 +173,7 @@ def _number_keys(at: Callable[[float], float], channel: Channel, shown: range) -
     fits = _straight(lambda frame: np.array(at(frame)), lambda largest: max(TOLERANCE, 2e-6 * float(largest)))
     keys: _Eased = [(shown.start, "linear")]
     if isinstance(channel, Samples):
-        frames = [frame for frame, _ in channel.keys]
-        keys = _keys(fits, channel.keys, frames, {}, shown)
+        keys = _keys(fits, dict(channel.keys), {}, shown)
     return _keyed(keys, lambda frame: _short(at(frame)), shown)
 
 
@@ -237,16 +236,15 @@ def _move_keys(moving: Subject, words: Mapping[float, Ease], shown: range) -> _E
     sampled = [channel for channel in moves if isinstance(channel, Samples)]
     for channel in sampled:
         eases = dict(channel.keys) | eases
-    frames = eases.keys() | words.keys()
 
     @cache
     def place(frame: float) -> np.ndarray:
         return motions.as_array([moving.placement(frame)])[0]
 
-    if not frames and tuple(place(shown.start)) != (0, 0, 0, 1):
-        frames = {shown.start}
+    if not (eases or words) and tuple(place(shown.start)) != (0, 0, 0, 1):
+        eases = {shown.start: "linear"}
     fits = _straight(place, lambda largest: TOLERANCE * np.maximum(1, largest))
-    return _keys(fits, eases.items(), sorted(frames), words, shown) if frames or sampled else []
+    return _keys(fits, eases, words, shown) if eases or words or sampled else []
 
 
 def _drawings(drawings: Drawings, frame: float) -> dict[float, list[np.ndarray]]:
@@ -259,29 +257,21 @@ def _drawings(drawings: Drawings, frame: float) -> dict[float, list[np.ndarray]]
     return result
 
 
-def _keys(
-    fits: _Fits,
-    keys: Collection[tuple[float, Ease]],
-    frames: Sequence[float],
-    words: Mapping[float, Ease],
-    shown: range,
-) -> _Eased:
+def _keys(fits: _Fits, eases: Mapping[float, Ease], words: Mapping[float, Ease], shown: range) -> _Eased:
     """Return frames and eases of the keys that reproduce the effect at every whole frame of the strip.
 
     Args:
         fits: Tells whether a share between two keys is right at a frame.
-        keys: Keys of the channels.
-        frames: Where keys are needed.
+        eases: Of the channels' keys, by frame.
         words: Eases that keys must have.
     """
-    if not frames:
+    if not (frames := sorted(eases.keys() | words.keys())):
         return [(frame, "linear") for frame in shown]
 
     def per_frame(outside: range, held: float) -> list[tuple[float, Ease]]:
         """Return a key for every frame outside all keys, unless the value at `held` fits."""
         return [] if all(fits(held, held, frame, 0) for frame in outside) else [(frame, "linear") for frame in outside]
 
-    eases = dict(keys)
     kept = per_frame(range(shown.start, min(math.ceil(frames[0]), shown.stop)), frames[0])
     for first, second in pairwise(frames):
         # Keys may lie a million frames outside the strip.

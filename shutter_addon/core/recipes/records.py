@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 
 from ..model import effect as model
-from ..model import keyframes, limits, mattes
+from ..model import keyframes, limits
 from ..model.fields import MISSING, Field, fields_of
 from ..model.frame_state import EXTREMES, Options
 from ..model.keyframes import Channel, Constant, Ease, Keys
@@ -188,7 +188,7 @@ RecipeRecord: Any = _record(
 
 
 def effect_of(recipe: Any) -> model.Effect:
-    """Return the effect of a checked recipe. `Effect.for_picture` completes it."""
+    """Return the effect of a checked recipe. `Effect.for_picture` gives it the aspect of pictures."""
     options = Options(**_values(Options, recipe))
     order = {shutter.name: index for index, shutter in enumerate(recipe.shutters)}
     regions = tuple(_region(region, order[region.shutter]) for region in recipe.regions)
@@ -271,7 +271,7 @@ def _region(record: Any, shutter: int) -> model.Region | model.MatteRegion:
     if isinstance(record, RegionRecord):
         values["kind"] = record.kind
     elif isinstance(record, OutlineRecord | SubjectRecord):
-        values["content"] = mattes.FileFrames(file=mattes.NoFile())  # Effect.for_picture sets the file
+        values["content"] = Constant(None)  # made in Blender
     elif isinstance(record, MatteRecord):
         file = {"path": record.path, "channel": record.channel}
         values["content"] = model.FileContent(**file, **_values(model.FileContent, record))

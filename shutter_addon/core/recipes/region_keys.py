@@ -18,16 +18,12 @@ _DIGITS = 6  # of measured numbers: far below a pixel
 STEADY = 0.25
 # The picture's corners, from its centre.
 CORNERS = motions.offsets([motions.PICTURE])
+Moving = Camera | Region | OutlineRegion | SubjectRegion  # what can be tracked
 
 
 def with_placements(
-    moving: Camera | Region | OutlineRegion | SubjectRegion,
-    placements: Placements,
-    exact: Collection[int],
-    size: Size,
-    *,
-    thin: bool = True,
-) -> Camera | Region | OutlineRegion | SubjectRegion:
+    moving: Moving, placements: Placements, exact: Collection[int], size: Size, *, thin: bool = True
+) -> Moving:
     """Return the region or camera with keys for these placements.
 
     They replace its keys from the first to the last of these frames. At whole frames beyond, it stays where it was, and
@@ -57,7 +53,7 @@ def with_placements(
     return replace(moving, moves=moves)
 
 
-def _shape(moving: Camera | Region | OutlineRegion | SubjectRegion) -> np.ndarray:
+def _shape(moving: Moving) -> np.ndarray:
     """Return the points (n, 2) of what moves, relative to its centre."""
     if isinstance(moving, Camera):
         return CORNERS

@@ -1,5 +1,6 @@
 """The mattes of a subject in all frames of its footage: found by a network under strokes, carried from there by the
-footage's motion, and corrected by the network again. Drawings overrule both.
+footage's motion, and corrected by the network again. Drawings overrule both. The network is U²-Net (Qin et al. 2020,
+"U²-Net: Going deeper with nested U-structure for salient object detection").
 
 Frames with strokes or drawings are keyframes. From each of them a chain of mattes goes forth and back, as far as the
 next keyframe or cut. A matte is made of the one before it in its chain, and a file keeps it; so it is the same wherever
@@ -8,24 +9,262 @@ a process begins. Between two keyframes, both chains are mixed in the middle.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from ...core import stopping
-from ...core.frames.frame_source import FrameSource
-from ...core.model import outlines
+from ...core.frames.frame_source import FrameSource, SourceFile
+from ...core.messages import MediaError, of_file
+from ...core.model import outlines, scribbles
+from ...core.pixels.matte_grid import Box, box_around
 from ...media import derived, flow, opencv
 from ...media.files import MODEL
 from ...media.image_writing import write_levels
 from ...media.opencv import cv2
 from . import carrying
 from .carried_mattes import CONFIDENCE, CarriedMattes, Drawings, nearest
-from .subject import WIDTH, Found, Network, covered, followed, found, refined, without
+
+MEAN, DEVIATION = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)  # of the colors that such networks are trained with
+MULTIPLE, LEAST = 32, 5  # the network halves its picture five times: sides are multiples of that, five at least
+QUICK = 0.8  # share of the network's own size that is enough where it is known how the subject looked a frame before
+INSIDE = 0.5
+# Shares of their size: the room on each side of a subject that the network sees, and of strokes; and pixels at least.
+ROOM, CLOSE, LEAST_ROOM = 0.2, 1.5, 8
+SURE = 0.9  # how sure the network has to be of what lies near strokes: else it looks at the whole picture
+TOUCHED = 0.5  # share of a stroke that a subject has to cover
+LARGEST = 0.9  # share of the picture from which on a mask is no subject
+SOFT = 3  # pixels of the working picture by which soft edges go beyond the contour of a part
+WIDTH = 0.01  # of a stroke, in parts of the picture's height
+SHARED = 0.2  # share of a part that the carried matte has to cover
+# How far the network and the carried matte agree: below that the network is not believed, and above it is.
+BELIEVED, MOST = (0.5, 0.7), 0.7
+# Of the confidence: how sure the network is, how far it agrees, from none to full; the pixels of the working picture
+# below which a subject is small; and how much it may rise from frame to frame, as what was lost seldom comes back.
+UNSURE, UNLIKE, SMALL, RISES = (0.85, 0.95), (0.5, 0.8), 3000, 0.05
+REST = 1.25  # how much more a pixel may differ from its place before than from where flow leads, to count as at rest
+_INPUT = re.compile(r"// <Input> CV_32FC1 \[1 x 3 x (\d+) x (\d+)\]")  # of OpenCV's description
+
+
+@dataclass(frozen=True)
+class Found:
+    """A subject in a picture.
+
+    Attributes:
+        share: (h, w) float32, 0 to 1, how sure a pixel belongs to it.
+        excluded: (h, w) float32, 0 to 1, what strokes have said that does not.
+        confidence: 0 to 1.
+    """
+
+    share: np.ndarray
+    excluded: np.ndarray
+    confidence: float
+
+
+class Network:
+    """A network with one picture in and one mask out. One thread at a time may use it."""
+
+    def __init__(self, path: Path) -> None:
+        """Read a network from an ONNX file.
+
+        Raises:
+            MediaError: The file is missing, damaged, or another kind of network.
+        """
+        self._name = path.name
+        try:
+            self._net = cv2.dnn.readNetFromONNX(np.fromfile(path, np.uint8))
+            sizes = _INPUT.findall(self._net.dump())
+        except OSError as error:
+            raise MediaError(of_file(error)) from None
+        except cv2.error:
+            raise MediaError(f"{path.name}: is damaged, or no ONNX model that OpenCV can run") from None
+        if not sizes:
+            raise self._foreign()
+        self._height, self._width = map(int, sizes[0])
+
+    def answer(self, picture: np.ndarray, share: float = 1.0) -> np.ndarray:
+        """Return how sure the network is (h, w) float32, 0 to 1, that a pixel of a picture (h, w, 3) uint8 belongs to
+        the subject.
+
+        Args:
+            share: Of the sides of the picture that the network looks at; the smaller, the quicker and coarser.
+
+        Raises:
+            MediaError: The network is of another kind.
+        """
+        stopping.check()
+        height, width = picture.shape[:2]
+        # As wide or high as the picture is.
+        sides = zip((width, height), (self._width, self._height), strict=True)
+        size = [max(round(share * own * side / max(height, width) / MULTIPLE), LEAST) * MULTIPLE for side, own in sides]
+        small = cv2.resize(picture, size, interpolation=cv2.INTER_AREA).astype(np.float32)
+        values = (small / max(float(small.max()), 1.0) - np.array(MEAN, np.float32)) / np.array(DEVIATION, np.float32)
+        try:
+            self._net.setInput(np.ascontiguousarray(values.transpose(2, 0, 1)[None]))
+            mask = self._net.forward(self._net.getUnconnectedOutLayersNames()[0])
+        except cv2.error:
+            raise self._foreign() from None
+        if mask.size != mask.shape[-1] * mask.shape[-2] or not np.isfinite(mask).all():
+            raise self._foreign()
+        mask = mask.reshape(mask.shape[-2:])
+        mask = (mask - mask.min()) / max(float(np.ptp(mask)), 1e-6)
+        return np.clip(cv2.resize(mask, picture.shape[1::-1], interpolation=cv2.INTER_LINEAR), 0, 1)
+
+    def within(self, picture: np.ndarray, box: Box, share: float = 1.0) -> np.ndarray:
+        """Return its answer on a part of a picture; nothing elsewhere."""
+        found = np.zeros(picture.shape[:2], np.float32)
+        found[box] = self.answer(np.ascontiguousarray(picture[box]), share)
+        return found
+
+    def _foreign(self) -> MediaError:
+        return MediaError(f"{self._name}: is no model with one picture in and one mask out")
+
+
+def refined(picture: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Return the matte (H, W) float32 of a picture (H, W, 3) uint8, from how sure (h, w) its pixels are inside."""
+    # Votes have less of what is thin than answers of the network have.
+    return carrying.refined(picture, np.maximum(share - np.float32(INSIDE - carrying.INSIDE), 0))
+
+
+def covered(strokes: Sequence[Any], picture: np.ndarray) -> np.ndarray:
+    """Return which pixels (h, w) bool of a picture strokes cover."""
+    points = tuple(np.asarray(stroke, np.float64) for stroke in strokes)
+    height, breadth = picture.shape[:2]
+    return scribbles.rasterise([scribbles.Shape(0, "line", WIDTH, points)], breadth, height) > 0
+
+
+def found(network: Network, picture: np.ndarray, on: np.ndarray, off: np.ndarray) -> Found | None:
+    """Return the subject under strokes; None if there is none.
+
+    Args:
+        picture: (h, w, 3) uint8.
+        on, off: (h, w) bool, what strokes on the subject cover, and strokes on what it is not.
+    """
+    if not on.any():
+        return None
+    box = around(on, CLOSE)
+    share = _parts_on(network.within(picture, box), on)
+    if (sure := _sure(share, on, box)) < SURE:  # the stroke is short beside the subject, or there is none
+        whole = _parts_on(network.answer(picture, QUICK), on)
+        everywhere = slice(0, on.shape[0]), slice(0, on.shape[1])
+        if (other := _sure(whole, on, everywhere)) > sure:
+            near = around(whole > INSIDE, ROOM)
+            share, sure = _parts_on(network.within(picture, near), on), other
+            sure = min(other, _sure(share, on, near))
+    if sure <= 0:
+        return None
+    return without(Found(share, np.zeros_like(share), _confidence(share, sure)), picture, on, off)
+
+
+def _sure(share: np.ndarray, on: np.ndarray, box: Box) -> float:
+    """Return how sure the network is of a part, 0 to 1; 0 if no subject is under strokes, less if the box cuts it."""
+    inside = share > INSIDE
+    if inside[on].mean() < TOUCHED or inside.mean() > LARGEST:
+        return 0.0
+    part, (rows, columns) = inside[box], box
+    ends = (rows.start > 0, part[0]), (rows.stop < len(share), part[-1])
+    sides = (columns.start > 0, part[:, 0]), (columns.stop < share.shape[1], part[:, -1])
+    cut = sum(int(edge.sum()) for is_cut, edge in (*ends, *sides) if is_cut)
+    return max(float(share[inside].mean()) - cut / sum(part.shape), 0.0)
+
+
+def _confidence(share: np.ndarray, sure: float, agrees: float = 1.0) -> float:
+    """Return how sure a subject is, 0 to 1: less if the network is unsure, motion disagrees, or it is small."""
+    size = np.count_nonzero(share > INSIDE) / SMALL
+    return float(_from(sure, UNSURE) * _from(agrees, UNLIKE) * min(size, 1.0) ** 0.5)
+
+
+def _from(value: float, ends: tuple[float, float]) -> float:
+    """Return how far a value is from one end to the other, 0 to 1."""
+    return min(max((value - ends[0]) / (ends[1] - ends[0]), 0.0), 1.0)
+
+
+def without(subject: Found, picture: np.ndarray, on: np.ndarray, off: np.ndarray) -> Found:
+    """Return a subject without what strokes say that it is not: all of a part that is smaller than the rest, or what
+    lies on their side of the edges between them and the strokes on the subject.
+
+    Args:
+        on, off: See `found`; where no stroke is on the subject, what is far from the others is.
+    """
+    inside = subject.share > INSIDE
+    _, parts = cv2.connectedComponents(inside.astype(np.uint8))
+    touched = np.isin(parts, np.setdiff1d(parts[off & inside], [0]))
+    if not touched.any():
+        return subject
+    gone = touched
+    if (touched & on).any() or 2 * touched.sum() > inside.sum():
+        away = cv2.distanceTransform((~off).astype(np.uint8), cv2.DIST_L2, 3)
+        markers = np.where(touched, 0, 3).astype(np.int32)
+        markers[on if (touched & on).any() else touched & (away > away[touched].max() / 2)] = 1
+        markers[off] = 2
+        gone = touched & (cv2.watershed(picture, markers) != 1)
+    excluded = _near(gone | off) & ~(inside & ~gone)
+    share = np.where(excluded, np.float32(0), subject.share)
+    return Found(share, np.maximum(subject.excluded, excluded), subject.confidence)
+
+
+def _near(where: np.ndarray) -> np.ndarray:
+    """Return what lies in an area (h, w), or beside it."""
+    return cv2.dilate(where.astype(np.uint8), np.ones((2 * SOFT + 1,) * 2, np.uint8)) > 0
+
+
+def _parts_on(answer: np.ndarray, on: np.ndarray) -> np.ndarray:
+    """Return the parts of an answer that lie under strokes."""
+    _, parts = cv2.connectedComponents((answer > INSIDE).astype(np.uint8))
+    return _alone(answer, np.isin(parts, np.setdiff1d(parts[on], [0])))
+
+
+def _alone(answer: np.ndarray, keep: np.ndarray) -> np.ndarray:
+    """Return an answer (h, w) with some of its parts alone, (h, w) bool, and their soft edges."""
+    return np.where(keep | (_near(keep) & (answer <= INSIDE)), answer, np.float32(0))
+
+
+def followed(network: Network, before: np.ndarray, picture: np.ndarray, subject: Found) -> tuple[Found, np.ndarray]:
+    """Return a subject in the frame behind one, carried there by motion and corrected by the network; and the share
+    (h, w) of the matte before that it keeps.
+
+    Args:
+        before, picture: (h, w, 3) uint8, the one frame, and the frame behind it.
+        subject: What it is in the one.
+    """
+    greys = [cv2.cvtColor(each, cv2.COLOR_RGB2GRAY) for each in (before, picture)]
+    grid = flow.grid(*subject.share.shape)
+    back = flow.fine_vectors(greys[1], greys[0])
+    carried, excluded = (flow.look(each, grid + back) for each in (subject.share, subject.excluded))
+    if not (carried > INSIDE).any():
+        return Found(carried, excluded, 0.0), np.zeros_like(carried)
+    answer = network.within(picture, around(carried > INSIDE, ROOM), QUICK) * (1 - excluded)
+    _, parts = cv2.connectedComponents((answer > INSIDE).astype(np.uint8))
+    sizes = np.bincount(parts.ravel())
+    keep = np.bincount(parts.ravel(), weights=(carried > INSIDE).ravel()) >= SHARED * sizes
+    keep[0] = False
+    answer = _alone(answer, keep[parts])
+    agrees = float(np.minimum(answer, carried).sum() / max(np.maximum(answer, carried).sum(), 1e-6))
+    sure = float(answer[answer > INSIDE].mean()) if (answer > INSIDE).any() else 0.0
+    trust = MOST * _from(agrees, BELIEVED)
+    share = carried + np.float32(trust) * (answer - carried)
+    colors, old = carrying.lab(picture), carrying.lab(before)
+    moved = np.hypot(back[..., 0], back[..., 1])
+    differ, rest = (carrying.apart(colors, each) for each in (old, np.stack([flow.look(p, grid + back) for p in old])))
+    moved[differ <= REST * rest] = 0  # without structure, noise alone makes flow
+    still = carrying.stillness(moved, colors, old)
+    confidence = min(_confidence(share, sure, agrees), subject.confidence + RISES)
+    return Found(share, excluded, confidence), still
+
+
+def around(where: np.ndarray, room: float) -> Box:
+    """Return the box around an area (h, w), with room on each side: a share of its longest one."""
+    area = where.astype(np.float32)
+    tight = box_around(area, reach=0)
+    assert tight is not None
+    reach = max(round(room * max(part.stop - part.start for part in tight)), LEAST_ROOM)
+    return box_around(area, reach) or tight
+
 
 VERSION = 1  # raise it when mattes of the same strokes change
 EXCLUDED = 1  # the level of what strokes say that the subject is not
@@ -54,15 +293,9 @@ class MarkedSubject:
             object.__setattr__(self, name, drawn)
 
 
-class Footage(Hashable, Protocol):
-    """What opens the source; equal where it gives the same frames."""
-
-    def open(self) -> FrameSource: ...
-
-
 @dataclass(frozen=True)
 class CarriedFile:
-    """A core.model.mattes.MatteFile of an outline or a subject.
+    """The mattes of an outline or a subject.
 
     Attributes:
         drawings: By ascending source frame, the curves of each (core.model.outlines).
@@ -71,7 +304,7 @@ class CarriedFile:
         model: The file of the network that finds subjects.
     """
 
-    footage: Footage
+    footage: SourceFile
     # Each frame of a window asks for the hash; drawings may have thousands of points.
     drawings: Drawings = field(hash=False)
     folder: Path | None = None

@@ -16,8 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core.caches import RecentValues
-from ...core.frames.frame_source import FrameSource, SourceWrapper
-from ...core.frames.planes import Decoded, Moment, as_rgba
+from ...core.frames.frame_source import Decoded, FrameSource, Moment, SourceWrapper, as_rgba
 from ...core.messages import MediaError
 from ...core.model.motions import Similarity
 from ...core.model.shutters import MAX_WINDOW

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from ...core.frames.frame_source import FrameSource, SourceFile
 from ...core.model import outlines
 from ...core.model.effect import Subject
-from ...core.model.mattes import MatteFile, MatteSource
 from ...core.model.motions import Motion, Similarity
 from ...core.pixels.matte_grid import box_around
 from ...media import flow
@@ -37,7 +37,7 @@ _SURELY = 0.5  # confidence from which on the first frame tells of a drift
 _AGREEING = 0.5  # share of such points from which on a step is sure
 
 
-def cover_of(mattes: MatteSource, shown: Callable[[int], int]) -> Cover:
+def cover_of(mattes: FrameSource, shown: Callable[[int], int]) -> Cover:
     """Return the cover of carried mattes. shown: returns the filmed frame at a timeline frame."""
     return lambda frame, size: flow.resized(mattes.read(min(shown(frame), mattes.count - 1)), size)
 
@@ -48,7 +48,7 @@ def cover_within(drawn: Callable[[int], Sequence]) -> Cover:
 
 
 def follow_carried(
-    region: Subject, file: MatteFile, shown: Mapping[float, int], *what: Any, **how: Any
+    region: Subject, file: SourceFile, shown: Mapping[float, int], *what: Any, **how: Any
 ) -> Iterator[Tracked]:
     """Yield MatteTrack.follow for a carried outline.
 

@@ -207,15 +207,9 @@ class Part:
         off = np.abs(change(self.points) - moved)
         error = _expected_error(self.points[agreeing], off[agreeing], weights[agreeing], self._ends, motion)
         found = guess.after(change)
-        return Match(
-            motion=found,
-            agreeing=agreeing,
-            seen=seen,
-            share=float(weights[agreeing].sum() / weights.sum()),
-            visible=float(weights.sum() / total),
-            error=error,
-            held=found(self.points[agreeing]),
-        )
+        share, visible = float(weights[agreeing].sum() / weights.sum()), float(weights.sum() / total)
+        held = found(self.points[agreeing])
+        return Match(motion=found, agreeing=agreeing, seen=seen, share=share, visible=visible, error=error, held=held)
 
     def _flow(self, picture: np.ndarray, guess: Similarity) -> tuple[np.ndarray, np.ndarray]:
         """Trace each corner into a picture that is moved back by a guess, and whether it can be traced back."""

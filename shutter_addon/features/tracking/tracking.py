@@ -76,13 +76,7 @@ class Track(ABC):
         self._subject = subject
 
     def follow(
-        self,
-        footage: Footage,
-        start: int,
-        frames: range,
-        *,
-        motion: Motion = "scale",
-        anchors: Collection[int] = (),
+        self, footage: Footage, start: int, frames: range, *, motion: Motion = "scale", anchors: Collection[int] = ()
     ) -> Iterator[Tracked]:
         """Yield placements at timeline frames: at `start`, then after it, then before it.
 
