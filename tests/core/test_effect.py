@@ -39,7 +39,7 @@ def keyed(first, last) -> Keys:
 
 def changed(drawn=(1.0,), placement=None, **channels) -> effect.Effect:
     """An effect of a shutter, a scribble and a matte, all still but for these."""
-    ramp = mattes.Ramp("linear", (0, 0), 0.0, 1.0)
+    ramp = mattes.Ramp("linear")
     still = {"options": Options(4), "edge_aware": 0, "bars": FIRST, "width": 0.1}
     still |= {"content": ramp, "opacity": 1.0, "feather": 0.0}
     each = {name: Constant(value) for name, value in still.items()} | channels

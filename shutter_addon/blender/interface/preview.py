@@ -16,9 +16,9 @@ from ... import features
 from ...compute.renderer import Renderer
 from ...compute.request import Request
 from ...core import stopping
-from ...core.model import fields
 from ...core.model.choices import CONTEXT
 from ...core.model.effect import SubjectRegion
+from ...core.model.fields import Labelled
 from ...core.model.frame_state import FrameState
 from ...devices.device import Texture
 from ..data import annotations, preview_areas, selection
@@ -63,22 +63,17 @@ _SOON = 0.1  # seconds
 
 @dataclass
 class _Settings:
-    live: bool = fields.switch("Live", "Show strokes and views of the effect in the preview", default=True)
-    view: str = fields.choice("View", "What the live preview shows", VIEWS, default="result", context=CONTEXT)
-    split: float = fields.fixed(
-        "Split Position",
-        "Border between source and result, as a fraction of the picture's width",
-        default=0.5,
-        subtype="FACTOR",
-    )
-    probe: bool = fields.switch("Probe", "Show the bars of the pixel under the pointer, and its share of each shutter")
-    probe_at: tuple[float, float] = fields.fixed(
-        "Probe Position",
-        "Position of the probe, as fractions of the picture from its lower left corner",
-        default=(-1.0, -1.0),
-        least=-1e3,
-        most=1e3,
-    )
+    live: bool = Labelled("Live", "Show strokes and views of the effect in the preview").switch(default=True)
+    view: str = Labelled("View", "What the live preview shows").choice(VIEWS, default="result", context=CONTEXT)
+    split: float = Labelled(
+        "Split Position", "Border between source and result, as a fraction of the picture's width"
+    ).fixed(default=0.5, subtype="FACTOR")
+    probe: bool = Labelled(
+        "Probe", "Show the bars of the pixel under the pointer, and its share of each shutter"
+    ).switch()
+    probe_at: tuple[float, float] = Labelled(
+        "Probe Position", "Position of the probe, as fractions of the picture from its lower left corner"
+    ).fixed(default=(-1.0, -1.0), least=-1e3, most=1e3)
 
 
 @with_fields(_Settings, live=_CHOSEN, view=_CHOSEN, split=_REDRAWN, probe=_REDRAWN, probe_at=_REDRAWN)

@@ -97,21 +97,6 @@ class Labelled:
         return dataclasses.field(default_factory=made or (lambda: default), metadata=said)
 
 
-def switch(label: str, description: str, **more: Any) -> Any:
-    """See Labelled."""
-    return Labelled(label, description).switch(**more)
-
-
-def choice(label: str, description: str, choices: Sequence[Choice], **more: Any) -> Any:
-    """See Labelled."""
-    return Labelled(label, description).choice(choices, **more)
-
-
-def fixed(label: str, description: str, **more: Any) -> Any:
-    """See Labelled."""
-    return Labelled(label, description).fixed(**more)
-
-
 def fields_of(*kinds: type) -> dict[str, Field]:
     """Return the Fields of classes, by attribute name."""
     return _fields_of(kinds)
