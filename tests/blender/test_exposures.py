@@ -1,4 +1,4 @@
-"""Exposures that follow keys, by which what moves stays sharp; that show lightest, darkest or median; and Follow Edges."""
+"""Exposures that follow keys, and so keep sharp what moves; lightest, darkest and median; and Follow Edges."""
 
 import json
 from dataclasses import replace

@@ -5,6 +5,7 @@ import pytest
 from support import (
     KEYED,
     MOVED,
+    copy_all,
     effect_of,
     image_strip,
     in_sequencer,
@@ -370,9 +371,7 @@ def test_pasted_strips_have_their_effect(bpy, edit, add, render, is_cut):
     region.follow_clip, region.strip = clip, "deleted with it"
     before = render(edit, [1, 5, 9, 20])
     assert not np.array_equal(before[1], before[20])
-    for s in edit.sequence_editor.strips:
-        s.select = True
-    in_sequencer(bpy, bpy.ops.sequencer.copy)
+    copy_all(bpy)
     if is_cut:
         in_sequencer(bpy, bpy.ops.sequencer.delete)
         assert not edit.virtual_shutter.effects
@@ -401,9 +400,7 @@ def test_a_cut_strip_pasted_into_another_edit(bpy, edit, add, render):
     assert not other.virtual_shutter.effects
     assert curves(edit)
     assert np.array_equal(render(edit, [5])[5], before)
-    for s in edit.sequence_editor.strips:
-        s.select = True
-    in_sequencer(bpy, bpy.ops.sequencer.copy)
+    copy_all(bpy)
     bpy.context.window.scene = other
     other.frame_set(1)
     in_sequencer(bpy, bpy.ops.sequencer.paste)

@@ -7,7 +7,7 @@ import shutil
 import av
 import numpy as np
 import pytest
-from support import effect_of, image_strip, in_sequencer, recipe, request, sequencer, write_frames
+from support import copy_all, effect_of, image_strip, in_sequencer, recipe, request, sequencer, write_frames
 from test_mask_reading import draw
 
 from shutter_addon.blender.data import annotations, recipe_import, selection, source_media, strips
@@ -337,10 +337,9 @@ def test_cut_and_pasted_effects_have_their_mattes(bpy, edit, shown, matte, mask)
     effect.regions[1].matte, effect.regions[1].strip_name = "STRIP", own.name
     effect.regions[2].matte, effect.regions[2].mask, effect.regions[2].opacity = "MASK", mask, 0.5
     before = coefficients(7)
-    for strip in edit.sequence_editor.strips:
-        strip.select = True
     edit.frame_set(1)
-    in_sequencer(bpy, bpy.ops.sequencer.copy, bpy.ops.sequencer.delete)
+    copy_all(bpy)
+    in_sequencer(bpy, bpy.ops.sequencer.delete)
     assert not edit.virtual_shutter.effects
     edit.sequence_editor.strips.new_effect("matte", "COLOR", 8, 1, length=5)
     in_sequencer(bpy, bpy.ops.sequencer.paste)
