@@ -132,7 +132,6 @@ def held_up(session, until):
 
 
 def test_who_is_stopped_waits_neither_for_a_device_nor_for_others_to_be_closed(film):
-    """Though the session's thread waits, as for a window that does not answer."""
     scene, answer, half = film[2].scene, threading.Event(), effect_source.Detail(2)
     waits = held_up(sessions.OFFSCREEN, answer)
     stops = iter([False])  # and then it is stopped

@@ -364,7 +364,6 @@ def test_undo_brings_an_effect_back_and_redo_removes_it_again(bpy, edit, add, re
 
 @pytest.mark.parametrize("is_cut", [True, False])
 def test_pasted_strips_have_their_effect(bpy, edit, add, render, is_cut):
-    """Blender's clipboard does not hold the scenes that strips show."""
     add()
     effect = edit.virtual_shutter.effects[0]
     clip, region = bpy.data.movieclips.load(f"{source_of(shown(edit)[0]).directory}f0001.png"), effect.regions[0]

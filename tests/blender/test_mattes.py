@@ -107,7 +107,6 @@ def test_the_timeline_and_an_offset(shown, matte):
 
 
 def test_a_file_without_colours_has_a_channel_by_name(bpy, edit, shown, tmp_path):
-    """As the files of `--weights`."""
     write_exr(tmp_path / "0001.exr", np.full((HEIGHT, WIDTH, 1), 0.25, np.float32), ["S1"])
     strip, effect, coefficients = shown(data())
     edit.sequence_editor.active_strip, effect.active_shutter = strip, 1
