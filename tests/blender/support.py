@@ -169,12 +169,18 @@ def sequencer(bpy):
         yield area
 
 
-def in_sequencer(bpy, *operators, **words):
-    """Calls operators of Blender's sequencer, one after the other, as its keys do."""
+def in_sequencer(bpy, operator, **words):
+    """Calls an operator of Blender's sequencer, as its keys do."""
     with sequencer(bpy) as area, bpy.context.temp_override(region=area.regions[-1]):
-        for operator in operators:
-            assert operator(**words) == {"FINISHED"}
+        assert operator(**words) == {"FINISHED"}
     bpy.context.view_layer.update()
+
+
+def copy_all(bpy):
+    """Selects the edit's strips and copies them."""
+    for strip in bpy.context.scene.sequence_editor.strips:
+        strip.select = True
+    in_sequencer(bpy, bpy.ops.sequencer.copy)
 
 
 def call(bpy, name, *arguments, **settings):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support import in_sequencer, noise, noise_film, picture_of, read_picture, refused
+from support import copy_all, in_sequencer, noise, noise_film, picture_of, read_picture, refused
 
 from shutter_addon.blender import command
 from shutter_addon.blender.data import selection, strips
@@ -182,9 +182,7 @@ def test_what_cannot_be_baked_is_one_sentence(film, tmp_path, run):
 def test_a_copy_of_all_of_it_is_unbaked_alone(bpy, film):
     scene, _effect, strip = film()
     bake(bpy)
-    for each in scene.sequence_editor.strips_all:
-        each.select = True
-    in_sequencer(bpy, bpy.ops.sequencer.copy)
+    copy_all(bpy)
     scene.frame_set(101)
     in_sequencer(bpy, bpy.ops.sequencer.paste)
     assert len(scene.sequence_editor.strips) == 6

@@ -1,18 +1,25 @@
-"""Pictures that are begun before Blender asks for them: used where they are right, and never where they are not."""
+"""Pictures that are begun before Blender asks for them, used only where they are right; and the way of each."""
 
+import json
+import re
 import threading
+from pathlib import Path
 from queue import Queue
 
+import frame_trace
 import numpy as np
 import pytest
-from support import noise, noise_film, picture_of
+from support import noise, noise_film, picture_of, recipe, write_movie
 
 from shutter_addon.blender.data import snapshot
 from shutter_addon.blender.devices import available
+from shutter_addon.blender.editing import whole_edits
 from shutter_addon.blender.rendering import effect_source, job_snapshots, session, sessions
 from shutter_addon.blender.rendering.session import RenderContext
 from shutter_addon.compute.renderer import Renderer
+from shutter_addon.core.recipes import recipe_file
 from shutter_addon.core.stopping import StoppedError
+from shutter_addon.media import open_source
 
 
 @pytest.fixture
@@ -125,7 +132,6 @@ def held_up(session, until):
 
 
 def test_who_is_stopped_waits_neither_for_a_device_nor_for_others_to_be_closed(film):
-    """Though the session's thread waits, as for a window that does not answer."""
     scene, answer, half = film[2].scene, threading.Event(), effect_source.Detail(2)
     waits = held_up(sessions.SESSIONS.offscreen, answer)
     stops = iter([False])  # and then it is stopped
@@ -160,3 +166,40 @@ def test_who_asks_for_room_keeps_what_it_uses(film, monkeypatch):
     found.free()
     assert renderer.missing(request)
     found.forget()
+
+
+# The way of a rendered frame: the page that tells it, and how often it comes back to a room
+
+ROOT = Path(__file__).parents[2]
+
+LINE = {"shutter": "S1", "kind": "line", "width": 0.02, "strokes": [[[0.3, 0.2], [0.5, 0.8]]]}
+RECIPE = recipe(8, [1] * 8, [1] + [0] * 7, regions=[LINE], border=True)
+
+
+def ways(bpy, footage, frames, tmp_path):
+    """The stops of each of these frames, rendered one after the other."""
+    import shutter_addon
+
+    sessions.forget()
+    with open_source(footage) as medium:
+        scene = whole_edits.make_edit(footage, medium, recipe_file.parse(json.dumps(RECIPE)), tmp_path)
+    scene.render.image_settings.file_format, scene.render.image_settings.color_depth = "PNG", "16"
+    door = "VirtualShutterEngine.render"
+    for frame in frames:
+        scene.frame_set(frame)
+        scene.render.filepath = str(tmp_path / f"{frame}.png")
+        with frame_trace.traced(Path(shutter_addon.__file__).parent, door, door) as stops:
+            bpy.ops.render.render(write_still=True, scene=scene.name)
+        yield stops
+
+
+def test_a_rendered_frame_goes_the_way_of_the_page(bpy, tmp_path):
+    pictures = [np.roll(noise(90, 160, 3), index, axis=1) for index in range(45)]
+    film = write_movie(tmp_path / "film.mp4", pictures, "libx264", "yuv420p", 25)
+    first, second = ways(bpy, film, (30, 31), tmp_path)
+    page = (ROOT / "docs" / "developers.md").read_text(encoding="utf-8").partition("\n## How a frame is made\n")[2]
+    told = re.findall(r"(?m)^\| `(.+?)` \| `(.+?)` \|", page.split("| File | Function |")[1])
+    made = [(stop.path, stop.function) for stop in first]
+    assert [stop for stop in made if stop in told] == told
+    back = frame_trace.returns(second)
+    assert len(back) <= 6, [stop[:2] for stop in back]

@@ -19,7 +19,7 @@ OTHER = SimpleNamespace(type="A", value="PRESS")
 
 @pytest.fixture
 def going(bpy):
-    """One that has three steps, and what its timers are."""
+    """One that has begun and has three steps, and what its timers are."""
 
     class Going(operator_bases.Beside):
         left, ends, leaves, blocks = 3, None, 0, True
@@ -47,12 +47,13 @@ def going(bpy):
         modal_handler_add=lambda _operator: None,
     )
     context = SimpleNamespace(window_manager=manager, window=object())
-    return Going(), context, timers
+    operator = Going()
+    assert operator.begin(context, waits=False) == {"RUNNING_MODAL"}
+    return operator, context, timers
 
 
 def test_it_ends_with_its_last_step(going):
     operator, context, timers = going
-    assert operator.begin(context, waits=False) == {"RUNNING_MODAL"}
     assert [operator.modal(context, event) for event in (TICK, OTHER, TICK)] == [{"RUNNING_MODAL"}] * 3
     assert len(timers) == 1
     assert operator.modal(context, TICK) == {"FINISHED"}
@@ -61,7 +62,6 @@ def test_it_ends_with_its_last_step(going):
 
 def test_escape_or_a_closed_window_ends_it_before_the_next_step(going):
     operator, context, timers = going
-    operator.begin(context, waits=False)
     assert operator.modal(context, ESCAPE) == {"FINISHED"}
     assert (operator.ends, operator.left, timers) == ("stopped", 3, [])
     operator.ends, operator.leaves = None, 0
@@ -72,7 +72,6 @@ def test_escape_or_a_closed_window_ends_it_before_the_next_step(going):
 
 def test_an_error_that_nobody_expects_lets_go_of_its_timer(going):
     operator, context, timers = going
-    operator.begin(context, waits=False)
     operator.left = None
     with pytest.raises(ZeroDivisionError):
         operator.modal(context, TICK)
@@ -81,7 +80,6 @@ def test_an_error_that_nobody_expects_lets_go_of_its_timer(going):
 
 def test_what_a_file_that_is_loaded_has_ended_ends_with_the_next_event(going, monkeypatch):
     operator, context, timers = going
-    operator.begin(context, waits=False)
     stands = SimpleNamespace(context=context, data=SimpleNamespace(workspaces=[]))
     monkeypatch.setattr(operator_bases, "bpy", stands)
     operator_bases.end_all()

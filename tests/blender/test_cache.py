@@ -170,7 +170,6 @@ def test_a_redraw_asks_the_ends_of_a_sequence_alone(edit, effect, asked):
 
 
 def test_a_film_asks_all_files_before_it_and_then_the_ends_alone(bpy, edit, render, long, asked, monkeypatch):
-    """However long a picture takes."""
     begin, counts = session.RenderSession.begin_next, []
 
     def begin_next(*arguments):

@@ -69,17 +69,6 @@ def keys(bpy, channel="location"):
     return [[(*key.co, key.type) for key in curve.keyframe_points] for curve in fcurves.curves_under(edit, path)]
 
 
-def everything(bpy):
-    """All that tracking the camera changes."""
-    _edit, effect, _strip = active(bpy)
-    camera = effect.camera
-    stops = [(stop.frame, stop.forward, stop.fault) for stop in camera.stops]
-    shutters = [(shutter.follow, tuple(consistency.bars(shutter))) for shutter in effect.shutters]
-    numbers = tuple(camera.location), camera.rotation, camera.scale, camera.confidence
-    channels = [keys(bpy, channel) for channel in ("location", "rotation", "scale", "confidence")]
-    return numbers, stops, channels, shutters, effect.position, effect.active_shutter
-
-
 def placements(bpy):
     """By timeline frame, of all that the strip has."""
     edit, effect, strip = active(bpy)
@@ -112,11 +101,12 @@ def test_the_camera_is_tracked_behind_what_regions_cover(bpy, effect):
 
 @pytest.mark.parametrize("name", ["track_camera", "tripod"])
 def test_the_buttons_are_one_step_of_undo(bpy, effect, name):
+    def seen(bpy):
+        return keys(bpy), keys(bpy, "scale"), [shutter.follow for shutter in active(bpy)[1].shutters]
+
     effect.camera.track_until = 18
-    before = everything(bpy)
-    does(bpy, everything, name)
-    after = everything(bpy)
-    assert (after[2] != before[2], after[3:] != before[3:]) == (True, name == "tripod")
+    does(bpy, seen, name)
+    assert ("CAMERA" in seen(bpy)[2]) == (name == "tripod")
 
 
 @pytest.mark.parametrize("has_region", [True, False])

@@ -41,10 +41,6 @@ def check(edit, render, source, frames, depth="8"):
         assert plain[frame][..., 0].std() > 20
 
 
-def test_a_movie(edit, render, clip_strip, movie):
-    check(edit, render, clip_strip(movie), range(1, 21, 2))
-
-
 def test_trimmed_cut_and_reversed(edit, render, clip_strip, movie):
     source = clip_strip(movie, 40)
     source.left_handle, source.right_handle = 43, 55

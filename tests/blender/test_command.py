@@ -307,8 +307,7 @@ def wait_for(condition, process):
         time.sleep(0.02)
 
 
-def test_no_gl(command, film, tmp_path):
-    """Without GL, NumPy composes and says so."""
+def test_without_gl_numpy_composes_and_says_so(command, film, tmp_path):
     env = {"__EGL_VENDOR_LIBRARY_FILENAMES": "/none", "LIBGL_DRIVERS_PATH": "/none", "EGL_PLATFORM": "none"}
     done = command(film[0], "--output", tmp_path / "out", "--frames", "1:2", recipe=STILL, env=env)
     assert "composing with NumPy" in done.stderr

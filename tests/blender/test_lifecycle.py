@@ -5,6 +5,7 @@ import pytest
 from support import (
     KEYED,
     MOVED,
+    copy_all,
     effect_of,
     image_strip,
     in_sequencer,
@@ -363,16 +364,13 @@ def test_undo_brings_an_effect_back_and_redo_removes_it_again(bpy, edit, add, re
 
 @pytest.mark.parametrize("is_cut", [True, False])
 def test_pasted_strips_have_their_effect(bpy, edit, add, render, is_cut):
-    """Blender's clipboard does not hold the scenes that strips show."""
     add()
     effect = edit.virtual_shutter.effects[0]
     clip, region = bpy.data.movieclips.load(f"{source_of(shown(edit)[0]).directory}f0001.png"), effect.regions[0]
     region.follow_clip, region.strip = clip, "deleted with it"
     before = render(edit, [1, 5, 9, 20])
     assert not np.array_equal(before[1], before[20])
-    for s in edit.sequence_editor.strips:
-        s.select = True
-    in_sequencer(bpy, bpy.ops.sequencer.copy)
+    copy_all(bpy)
     if is_cut:
         in_sequencer(bpy, bpy.ops.sequencer.delete)
         assert not edit.virtual_shutter.effects
@@ -401,9 +399,7 @@ def test_a_cut_strip_pasted_into_another_edit(bpy, edit, add, render):
     assert not other.virtual_shutter.effects
     assert curves(edit)
     assert np.array_equal(render(edit, [5])[5], before)
-    for s in edit.sequence_editor.strips:
-        s.select = True
-    in_sequencer(bpy, bpy.ops.sequencer.copy)
+    copy_all(bpy)
     bpy.context.window.scene = other
     other.frame_set(1)
     in_sequencer(bpy, bpy.ops.sequencer.paste)

@@ -189,10 +189,9 @@ def test_shape_keys_are_read_and_refused(moving, monkeypatch):
     """Reading leaves the mask as it is. Another Blender may have shape keys elsewhere."""
     spline = moving.layers["L"].splines[0]
     stood = [tuple(point.co) for point in spline.points]
-    shapes = list(mask_reading.at_frames(moving, (5, 15, 30, 100)))
+    first, last, beyond = mask_reading.at_frames(moving, (5, 30, 100))
     assert [tuple(point.co) for point in spline.points] == stood
-    assert [shape.layers[0].splines[0].points[0][1][0] for shape in shapes] == pytest.approx([0.1, 0.3, 0.6, 0.6])
-    assert shapes[2] == shapes[3] != shapes[0]
+    assert last == beyond != first
     assert_refused(moving)
 
     def elsewhere(*_):

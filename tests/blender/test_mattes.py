@@ -7,7 +7,7 @@ import shutil
 import av
 import numpy as np
 import pytest
-from support import effect_of, image_strip, in_sequencer, recipe, request, sequencer, write_frames
+from support import copy_all, effect_of, image_strip, in_sequencer, recipe, request, sequencer, write_frames
 from test_mask_reading import draw
 
 from shutter_addon.blender.data import annotations, recipe_import, selection, source_media, strips
@@ -107,7 +107,6 @@ def test_the_timeline_and_an_offset(shown, matte):
 
 
 def test_a_file_without_colours_has_a_channel_by_name(bpy, edit, shown, tmp_path):
-    """As the files of `--weights`."""
     write_exr(tmp_path / "0001.exr", np.full((HEIGHT, WIDTH, 1), 0.25, np.float32), ["S1"])
     strip, effect, coefficients = shown(data())
     edit.sequence_editor.active_strip, effect.active_shutter = strip, 1
@@ -337,10 +336,9 @@ def test_cut_and_pasted_effects_have_their_mattes(bpy, edit, shown, matte, mask)
     effect.regions[1].matte, effect.regions[1].strip_name = "STRIP", own.name
     effect.regions[2].matte, effect.regions[2].mask, effect.regions[2].opacity = "MASK", mask, 0.5
     before = coefficients(7)
-    for strip in edit.sequence_editor.strips:
-        strip.select = True
     edit.frame_set(1)
-    in_sequencer(bpy, bpy.ops.sequencer.copy, bpy.ops.sequencer.delete)
+    copy_all(bpy)
+    in_sequencer(bpy, bpy.ops.sequencer.delete)
     assert not edit.virtual_shutter.effects
     edit.sequence_editor.strips.new_effect("matte", "COLOR", 8, 1, length=5)
     in_sequencer(bpy, bpy.ops.sequencer.paste)
