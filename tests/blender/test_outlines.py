@@ -52,8 +52,7 @@ def edited(bpy, edit, footage):
     def make(*regions, change=lambda source: None):
         source = image_strip(edit, footage)
         change(source)
-        content = recipe(2, [1, 0], [0, 1], regions=regions, **OPTIONS)
-        return effect_of(edit, source, content)
+        return effect_of(edit, source, recipe(2, [1, 0], [0, 1], regions=regions, **OPTIONS))
 
     yield make
     sessions.forget()

@@ -12,14 +12,9 @@ from shutter_addon.core.frames import light
 FRAME = 20  # on the timeline, of the source's frame 9
 
 
-@pytest.fixture(scope="module")
-def frames(tmp_path_factory):
-    return write_frames(tmp_path_factory.mktemp("passing"), [picture(i) for i in range(COUNT)])
-
-
 @pytest.fixture
-def region(bpy, edit, frames):
-    yield drawn(edit, new_source(edit, frames))
+def region(bpy, edit, tmp_path):
+    yield drawn(edit, new_source(edit, write_frames(tmp_path / "passing", [picture(i) for i in range(COUNT)])))
     sessions.forget()
 
 

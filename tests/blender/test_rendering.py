@@ -17,9 +17,7 @@ def film(bpy, edit, tmp_path):
     """Six frames under an effect that shows them a frame late, to be rendered as pictures; the edit."""
     sessions.forget()
     frames = np.random.default_rng(0).integers(0, 256, (6, 32, 32, 3), dtype=np.uint8)
-    first = write_frames(tmp_path / "in", frames)
-    source = image_strip(edit, first)
-    _strip, _effect = effect_of(edit, source, recipe(2, [0, 1]))
+    effect_of(edit, image_strip(edit, write_frames(tmp_path / "in", frames)), recipe(2, [0, 1]))
     edit.render.resolution_x = edit.render.resolution_y = 32
     edit.frame_start, edit.frame_end = 1, 6
     edit.render.image_settings.media_type = "IMAGE"
@@ -55,8 +53,8 @@ def effect_scene(edit):
     return edit.virtual_shutter.effects[0].scene
 
 
-def test_a_python_that_uses_blender_lives_on(bpy, film, tmp_path, capfd):
-    mend = broken(tmp_path)
+def test_a_python_that_uses_blender_lives_on_and_what_follows_knows_nothing_of_the_failure(bpy, film, tmp_path, capfd):
+    mend, scene = broken(tmp_path), effect_scene(film)
     for _ in range(2):  # the sequencer keeps what it showed in the failed picture's place
         assert bpy.ops.render.render(animation=True) == {"CANCELLED"}
         assert names(tmp_path / "out") == ["0001.png", "0002.png"]
@@ -64,25 +62,19 @@ def test_a_python_that_uses_blender_lives_on(bpy, film, tmp_path, capfd):
         assert said.count("Virtual Shutter: f0004.png") == 1
         assert "Traceback" not in said
     assert len(bpy.data.scenes) == 2
+    assert bpy.ops.render.render(scene=scene.name) == {"FINISHED"}
+    film.frame_set(3)
+    scene.frame_set(3)
+    capfd.readouterr()
+    for _ in range(2):  # an effect's own scene ends like any film
+        assert bpy.ops.render.render(scene=scene.name) == {"CANCELLED"}
+        assert capfd.readouterr().err.count("Virtual Shutter: f0004.png") == 1
     mend()
     sessions.forget()
     assert bpy.ops.render.render(animation=True) == {"FINISHED"}
     assert len(names(tmp_path / "out")) == 6
     expected = read_picture(tmp_path / "in" / "f0004.png")
     assert np.abs(read_picture(tmp_path / "out" / "0003.png")[..., :3] - expected).max() <= 1
-
-
-def test_what_follows_a_render_that_failed_knows_nothing_of_it(bpy, film, tmp_path, capfd):
-    broken(tmp_path)
-    assert bpy.ops.render.render(animation=True) == {"CANCELLED"}
-    scene = effect_scene(film)
-    assert bpy.ops.render.render(scene=scene.name) == {"FINISHED"}
-    film.frame_set(3)
-    scene.frame_set(3)
-    capfd.readouterr()
-    for _ in range(2):  # and an effect's own scene ends like any film
-        assert bpy.ops.render.render(scene=scene.name) == {"CANCELLED"}
-        assert capfd.readouterr().err.count("Virtual Shutter: f0004.png") == 1
 
 
 def test_a_movie_is_finished_up_to_the_picture_that_fails_and_a_single_frame_not_written(bpy, film, tmp_path):

@@ -16,11 +16,6 @@ COUNT = 14  # frames
 
 
 @pytest.fixture
-def noise():
-    return np.random.default_rng(3).integers(0, 256, (COUNT, 24, 40, 3), dtype=np.uint8)
-
-
-@pytest.fixture
 def save(bpy, tmp_path):
     """Saves the edit that is open, with the paths of its footage relative to it."""
 
@@ -34,9 +29,10 @@ def save(bpy, tmp_path):
 
 
 @pytest.fixture
-def saved(bpy, edit, noise, save, tmp_path):
+def saved(bpy, edit, save, tmp_path):
     """An edit that is more than a source and its effect: the source goes on behind the effect, which lets it shine
     through, below a second strip of footage; with dither, a view transform and a size of its own."""
+    noise = np.random.default_rng(3).integers(0, 256, (COUNT, 24, 40, 3), dtype=np.uint8)
     _source, _effect, strip = noise_film(edit, noise, tmp_path)
     strip.blend_alpha = 0.75
     strip.right_handle = COUNT - 1

@@ -109,8 +109,5 @@ def test_what_older_versions_do_not_know_has_another_format():
 def test_everything_that_is_stored_is_in_the_files(bpy, monkeypatch):
     monkeypatch.setattr(data_format, "migrate", lambda: None)  # which may leave something out
     bpy.ops.wm.open_mainfile(filepath=str(FOLDERS[-1] / "edit.blend"))
-    assert stored.unused() & all_of(json.loads((FOLDERS[-1] / "names.json").read_text())["properties"]) == set()
-
-
-def all_of(properties):
-    return {f"{name}.{prop}" for name, props in properties.items() for prop in props}
+    properties = json.loads((FOLDERS[-1] / "names.json").read_text())["properties"]
+    assert stored.unused() & {f"{name}.{prop}" for name, props in properties.items() for prop in props} == set()

@@ -1,7 +1,6 @@
 """Colours of a still effect are those of its source in the colour spaces that Blender's sequencer has."""
 
 import numpy as np
-import pytest
 from support import effect_of, recipe, write_frames
 
 from shutter_addon.blender.rendering import render_job
@@ -12,24 +11,6 @@ LOSSY = {
     *("ACES 1.3 sRGB", "ACES 2.0 sRGB", "ADX10", "ADX16"),
     *("AgX Base sRGB", "AgX Log", "Khronos PBR Neutral sRGB"),
 }
-
-
-@pytest.fixture
-def made(edit, tmp_path):
-    """Makes an effect on a picture of all colours in steps of 17 levels: its strip."""
-    cube = np.stack(np.meshgrid(*[np.arange(0, 256, 17, dtype=np.uint8)] * 3), axis=-1).reshape(1, 64, 64, 3)
-    first = write_frames(tmp_path / "in", cube)
-    edit.render.resolution_x = edit.render.resolution_y = 64
-
-    def make():
-        for strip in list(edit.sequence_editor.strips):
-            edit.sequence_editor.strips.remove(strip)
-        source = edit.sequence_editor.strips.new_image("colours", str(first), 1, 1)
-        source.right_handle = 3
-        strip, _effect = effect_of(edit, source, recipe(1, [1]))
-        return strip
-
-    return make
 
 
 def apart(edit, render, strip) -> float:
@@ -44,15 +25,23 @@ def apart(edit, render, strip) -> float:
     return np.abs(shown - plain).max()
 
 
-def test_an_effect_that_is_added_keeps_all_colours(edit, render, made, capfd, monkeypatch):
+def test_an_effect_that_is_added_keeps_all_colours(edit, render, tmp_path, capfd, monkeypatch):
     """And an editor who lays it over others is told where these change some; a few of the spaces that do not."""
+    # A picture of all colours in steps of 17 levels.
+    cube = np.stack(np.meshgrid(*[np.arange(0, 256, 17, dtype=np.uint8)] * 3), axis=-1).reshape(1, 64, 64, 3)
+    first = write_frames(tmp_path / "in", cube)
+    edit.render.resolution_x = edit.render.resolution_y = 64
     spaces = [item.identifier for item in edit.sequencer_colorspace_settings.bl_rna.properties["name"].enum_items]
     assert len(spaces) > 50
     for space in sorted(LOSSY | set(spaces[::9])):
         told = f'In the color space "{space}" Blender'
         edit.sequencer_colorspace_settings.name = space
         monkeypatch.setattr(render_job.job, "said", set())  # what was said is not said again
-        strip = made()
+        for strip in list(edit.sequence_editor.strips):
+            edit.sequence_editor.strips.remove(strip)
+        source = edit.sequence_editor.strips.new_image("colours", str(first), 1, 1)
+        source.right_handle = 3
+        strip, _effect = effect_of(edit, source, recipe(1, [1]))
         assert strip.blend_type == ("REPLACE" if space in LOSSY else "ALPHA_OVER"), space
         assert apart(edit, render, strip) <= LEVELS, space
         assert told not in capfd.readouterr().err

@@ -1,13 +1,10 @@
 """The command over moments between frames, end to end."""
 
-import json
-
 import numpy as np
 import pytest
 from standin import Between, moments, spread
 from support import packages, read_picture, recipe, write_frames
 
-from shutter_addon.blender import command
 from shutter_addon.core.frames import light
 from shutter_addon.media import flow, open_source
 
@@ -27,15 +24,12 @@ def film(tmp_path_factory):
 
 
 @pytest.fixture
-def run(bpy, tmp_path, monkeypatch, capfd):
+def run(command_here, tmp_path, monkeypatch):
     """Renders in this process by moments that are known: what is said on stderr."""
     monkeypatch.setattr(flow, "Between", Between)
 
     def run(source, output, recipe, *arguments):
-        (tmp_path / "recipe.json").write_text(json.dumps(recipe))
-        arguments = ["render", source, "--output", tmp_path / output, "--recipe", tmp_path / "recipe.json", *arguments]
-        assert command.main([str(argument) for argument in arguments]) == 0
-        return capfd.readouterr().err
+        return command_here(source, "--output", tmp_path / output, *arguments, recipe=recipe).stderr
 
     return run
 
@@ -86,13 +80,12 @@ def test_a_recipe_of_the_first_version(run, film, tmp_path, same_pixels):
     same_pixels(read_picture(tmp_path / "out" / "0002.png"), shown(frames, range(4, 12), spread(bars, STEPS)), 1)
 
 
-def test_a_saved_edit_in_blender(bpy, film, tmp_path, blender, blenders_python, monkeypatch):
+def test_a_saved_edit_in_blender(command_here, film, tmp_path, blender, blenders_python, monkeypatch):
     """With real flow: as the library renders it, and nothing lies beside it."""
     first, _ = film
     monkeypatch.setenv("PYTHONPATH", str(packages(tmp_path / "packages", blenders_python)))
-    (tmp_path / "recipe.json").write_text(json.dumps(recipe(3, np.ones(3), inbetween=STEPS)))
     places = ["--save", f"{tmp_path}/edit/e.blend", "--output", f"{tmp_path}/out", "--frames", "4:7"]
-    assert command.main(["render", str(first), "--recipe", f"{tmp_path}/recipe.json", *places]) == 0
+    command_here(first, *places, recipe=recipe(3, np.ones(3), inbetween=STEPS))
     assert [path.name for path in (tmp_path / "edit").iterdir()] == ["e.blend"]
     done = blender(tmp_path / "edit" / "e.blend", "-o", f"{tmp_path}/again/", "-a")
     assert done.returncode == 0, done.stderr

@@ -18,9 +18,7 @@ FRAMES = range(1, 25)
 def found(bpy, edit, tmp_path):
     """Edit, effect and strip; shutters keyed by bars and by value, a region keyed and drawn twice, options keyed."""
     frames = np.random.default_rng(0).integers(0, 256, (24, 24, 40, 3), dtype=np.uint8)
-    first = write_frames(tmp_path / "in", frames)
-    source = image_strip(edit, first)
-    strip, effect = started(edit, source)
+    strip, effect = started(edit, image_strip(edit, write_frames(tmp_path / "in", frames)))
     effect.window = 4
     for frame, bars in ((1, [1, 0, 0, 0]), (20, [0, 0, 0, 1])):
         edit.frame_set(frame)

@@ -26,8 +26,7 @@ def edited(bpy, edit, tmp_path):
     """Makes an effect of a half open shutter whose length is the timeline's: its strip and the effect."""
 
     def make(change=lambda source: None, **options):
-        first = write_frames(tmp_path / "in", [frame(i) for i in range(COUNT)])
-        source = image_strip(edit, first)
+        source = image_strip(edit, write_frames(tmp_path / "in", [frame(i) for i in range(COUNT)]))
         change(source)
         said = recipe(WINDOW, [1] * (WINDOW // 2) + [0] * (WINDOW // 2), **options)
         said["shutters"][0]["length"] = "timeline"

@@ -3,8 +3,6 @@
 import inspect
 import math
 from contextlib import suppress
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -29,9 +27,7 @@ pytestmark = pytest.mark.usefixtures("no_exception")
 def effect(bpy, edit, tmp_path):
     """An effect of two shutters, the second keyed and drawn with; its strip active."""
     frames = np.random.default_rng(0).integers(0, 256, (12, 24, 40, 3), dtype=np.uint8)
-    first = write_frames(tmp_path / "in", frames)
-    source = image_strip(edit, first)
-    strip, effect = started(edit, source)
+    strip, effect = started(edit, image_strip(edit, write_frames(tmp_path / "in", frames)))
     effect.window = 4
     region = region_edits.add_region(effect, effect.shutters[1], name="Face")
     draw(annotations.layer_of(effect, region), [(-9, -9), (9, 0), (3, 8)])
@@ -145,7 +141,7 @@ IMPOSSIBLE = {
 
 
 @pytest.mark.parametrize("name", IMPOSSIBLE)
-def test_one_sentence_tells_the_place(bpy, edit, effect, name):
+def test_one_sentence_tells_the_place(bpy, edit, effect, tmp_path, name):
     """From the renderer, and from wherever the effect is shown no trace."""
     scene = effect.scene
     assert picture_of(scene, 4).shape == (24, 40, 4)
@@ -155,7 +151,8 @@ def test_one_sentence_tells_the_place(bpy, edit, effect, name):
         picture_of(scene, 4)
     assert sentence in str(raised.value)
     assert len(str(raised.value)) <= 300
-    exported(edit, effect)
+    with suppress(*effect_source.FAULTS, RecipeError):
+        matte_export.recipe_for(edit, effect, strip_of(effect), tmp_path / "r.json")
     show(bpy, edit)
 
 
@@ -241,11 +238,6 @@ def test_editors_can_mend_it(bpy, edit, effect):
         effect.active_shutter = 0
         assert bpy.ops.shutter.preset(preset="ANGLE_360") == {"FINISHED"}
     assert picture_of(scene, 4).shape == (24, 40, 4)
-
-
-def exported(edit, effect):
-    with suppress(*effect_source.FAULTS, RecipeError), TemporaryDirectory() as folder:
-        matte_export.recipe_for(edit, effect, strip_of(effect), Path(folder, "r.json"))
 
 
 class Layout:

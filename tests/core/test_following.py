@@ -38,10 +38,6 @@ def followed(*arguments, **given):
 STRAIGHT = [key(0, (0, 0)), key(100, (1, 0.5))]
 
 
-def shifts(source, frames, **given):
-    return followed(source, **given).at(frames)[1][:, 0]
-
-
 WHIRL = [key(1), key(2, (0.1, 0), 90, 2)]
 
 
@@ -61,7 +57,7 @@ def test_the_location_alone_is_followed():
 def test_smoothing_is_the_weighted_mean_of_the_frames_around():
     jump = [key(10, ease="constant"), key(20, (0.5, 0))]
     source = with_way(made(jump, "center"), follow_smooth=3)
-    found = shifts(source, [19], frame=17, index=16, shown=lambda f: int(f) - 1)
+    found = followed(source, 17, 16, shown=lambda f: int(f) - 1).at([19])[1][:, 0]
     weights = smoothing(3)
     # At frame 20 those from 20 on count, of 17 to 23; at frame 17 the last of 14 to 20.
     assert found[0] == pytest.approx(32 * (weights[3:].sum() - weights[-1]))

@@ -58,16 +58,12 @@ def test_what_changes_nothing_is_the_same_array():
     assert block_means(values, 1) is fitted(values, 64, 36) is feathered(values, 0) is values
 
 
-def profile(distance, width):
-    return 0.5 + 0.5 * math.erf(distance * EDGE_SIGMAS / width / math.sqrt(2))
-
-
 @pytest.mark.parametrize("width", [0.5, 1, 2, 5, 10.7, 21.6, 24, 40, 43.3, 86])
 def test_a_hard_edge_becomes_the_error_function(width):
     for at in (100, 101, 102, 103):
         values = np.zeros((203, 4), np.float32)
         values[at:] = 1
-        expected = [profile(row + 0.5 - at, width) for row in range(203)]
+        expected = [0.5 + 0.5 * math.erf((row + 0.5 - at) * EDGE_SIGMAS / width / math.sqrt(2)) for row in range(203)]
         for result in (feathered(values, width)[:, 1], feathered(np.ascontiguousarray(values.T), width)[1]):
             assert np.abs(result - expected).max() < LEVEL
 

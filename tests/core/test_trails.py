@@ -59,10 +59,6 @@ def accelerating(trail, position="center", bars=(1.0,) * WINDOW, edges="hold", f
     return made(len(bars), [shutter], [region], position=position, edges=edges, camera=keys)
 
 
-def with_options(source, **options):
-    return replace(source, options=Constant(replace(source.options.at(1), **options)))
-
-
 def followed(source, frame, direction=1):
     effect = source.for_picture(SOURCE.width / SOURCE.height)
     if direction < 0:
@@ -89,7 +85,7 @@ def test_what_slides_is_as_long_at_the_clips_end_and_lies_within(bars):
     assert [streak(source, frame) for frame in (45, 57, 60)] == pytest.approx([30] * 3, rel=0.06)
     state, index = followed(source, SOURCE.count)
     assert windows.reach(state, index)[1] == SOURCE.count - 1
-    held, index = followed(with_options(source, edges="hold"), SOURCE.count)
+    held, index = followed(accelerating(0.3, bars=bars, edges="hold"), SOURCE.count)
     assert windows.reach(held, index)[1] > SOURCE.count + 3
 
 

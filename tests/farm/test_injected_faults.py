@@ -124,12 +124,9 @@ def whole(worker, tmp_path_factory):
     write_movie(node.folder / "matte.mkv", _halves(), rate=FRAMES)
     recipe = node.folder / "recipe.json"
     recipe.write_text(json.dumps(RECIPE))
-    for step in [
-        ("render", node.folder / "film.mkv", "--recipe", recipe, "--save", node.edit),
-        node.look(),
-        ("render", node.edit, "--output", node.pictures, "--device", "cpu"),
-        node.join(),
-    ]:
+    first = "render", node.folder / "film.mkv", "--recipe", recipe, "--save", node.edit
+    whole = "render", node.edit, "--output", node.pictures, "--device", "cpu"
+    for step in (first, node.look(), whole, node.join()):
         assert worker(*step) == (0, "")
     assert len(_pictures(node)) == FRAMES
     return node
