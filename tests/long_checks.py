@@ -37,11 +37,8 @@ GROUPS = {
             "tests/window/test_rendered.py::test_preview_and_film_take_turns_where_the_gpu_is_small",
         ],
         [
-            "tests/window/gpu_*.py",
-            "tests/window/own_gpu_story.py",
-            "tests/window/memory_story.py",
-            "shutter_addon/devices/*.py",
-            "shutter_addon/blender/devices/*.py",
+            *("tests/window/gpu_*.py", "tests/window/own_gpu_story.py", "tests/window/memory_story.py"),
+            *("shutter_addon/devices/*.py", "shutter_addon/blender/devices/*.py"),
             "shutter_addon/blender/rendering/*.py",
         ],
     ),
@@ -49,12 +46,9 @@ GROUPS = {
         ["tests/window/test_tracked.py::test_one_stroke"],
         [
             "tests/window/one_stroke_story.py",
-            "shutter_addon/media/tracking.py",
-            "shutter_addon/media/registration.py",
-            "shutter_addon/blender/editing/track_region.py",
-            "shutter_addon/blender/editing/motion_keys.py",
-            "shutter_addon/blender/interface/track_operators.py",
-            "shutter_addon/blender/interface/region_gizmo.py",
+            *("shutter_addon/media/tracking.py", "shutter_addon/media/registration.py"),
+            *("shutter_addon/blender/editing/track_region.py", "shutter_addon/blender/editing/motion_keys.py"),
+            *("shutter_addon/blender/interface/track_operators.py", "shutter_addon/blender/interface/region_gizmo.py"),
         ],
     ),
     "Metal": (["tests/compute/test_metal.py"], ["shaders/**/*", "shutter_addon/devices/passes.py"]),
@@ -91,7 +85,6 @@ def unchanged() -> set[str]:
 
 
 def left_out(names: list[str]) -> set[str]:
-    """Return those names of tests that belong to unchanged groups."""
     begins = tuple(begin for group in unchanged() for begin in GROUPS[group][0])
     return {name for name in names if name.startswith(begins)}
 
