@@ -63,7 +63,6 @@ def bunny():
 
 @pytest.fixture(scope="session")
 def real_blender():
-    """The command that runs a real Blender, as a list."""
     if not os.environ.get("BLENDER"):
         pytest.skip("NO REAL BLENDER: set BLENDER to the command that runs one")
     return [*shlex.split(os.environ["BLENDER"]), "--python-use-system-env"]
@@ -71,7 +70,6 @@ def real_blender():
 
 @pytest.fixture(scope="session")
 def blenders_python(real_blender):
-    """The version of its Python, X.Y."""
     code = "import sys; print('PYTHON', '%d.%d' % sys.version_info[:2])"
     command = [*real_blender, "-b", "--factory-startup", "--python-expr", code]
     return re.search(r"PYTHON (.+)", subprocess.run(command, capture_output=True, text=True, check=True).stdout)[1]
@@ -133,16 +131,10 @@ def to_metal(tmp_path_factory):
     binary, metal = folder / "shader.spv", folder / "shader.metal"
 
     def translated(source: str, stage: str) -> str:
-        compiled = subprocess.run(
-            ["glslangValidator", "-V", "--target-env", "vulkan1.2", "--stdin", "-S", stage, "-o", binary],
-            input=source,
-            capture_output=True,
-            text=True,
-        )
-        assert compiled.returncode == 0, compiled.stdout
-        command = ["spirv-cross", binary, "--msl", "--msl-version", "20200", "--output", metal]
-        done = subprocess.run(command, capture_output=True, text=True)
-        assert done.returncode == 0, done.stderr
+        compile_ = ["glslangValidator", "-V", "--target-env", "vulkan1.2", "--stdin", "-S", stage, "-o", binary]
+        for command in (compile_, ["spirv-cross", binary, "--msl", "--msl-version", "20200", "--output", metal]):
+            done = subprocess.run(command, input=source, capture_output=True, text=True)
+            assert done.returncode == 0, done.stdout + done.stderr
         return metal.read_text()
 
     return translated

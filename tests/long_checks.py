@@ -37,11 +37,8 @@ GROUPS = {
             "tests/window/test_rendered.py::test_preview_and_film_take_turns_where_the_gpu_is_small",
         ],
         [
-            "tests/window/gpu_*.py",
-            "tests/window/own_gpu_story.py",
-            "tests/window/memory_story.py",
-            "shutter_addon/devices/*.py",
-            "shutter_addon/blender/devices/*.py",
+            *("tests/window/gpu_*.py", "tests/window/own_gpu_story.py", "tests/window/memory_story.py"),
+            *("shutter_addon/devices/*.py", "shutter_addon/blender/devices/*.py"),
             "shutter_addon/blender/rendering/*.py",
         ],
     ),
@@ -49,13 +46,9 @@ GROUPS = {
         ["tests/window/test_tracked.py::test_one_stroke"],
         [
             "tests/window/one_stroke_story.py",
-            "shutter_addon/features/tracking/tracking.py",
-            "shutter_addon/features/tracking/registration.py",
-            "shutter_addon/features/tracking/blender/track_region.py",
-            "shutter_addon/blender/editing/motion_keys.py",
-            "shutter_addon/blender/data/selection.py",
-            "shutter_addon/features/tracking/blender/track_operators.py",
-            "shutter_addon/blender/interface/region_gizmo.py",
+            *("shutter_addon/features/tracking/tracking.py", "shutter_addon/features/tracking/registration.py"),
+            *("shutter_addon/features/tracking/blender/track_*.py", "shutter_addon/blender/editing/motion_keys.py"),
+            *("shutter_addon/blender/data/selection.py", "shutter_addon/blender/interface/region_gizmo.py"),
         ],
     ),
     "features": (
@@ -96,7 +89,6 @@ def unchanged() -> set[str]:
 
 
 def left_out(names: list[str]) -> set[str]:
-    """Return those names of tests that belong to unchanged groups."""
     begins = tuple(begin for group in unchanged() for begin in GROUPS[group][0])
     return {name for name in names if name.startswith(begins)}
 

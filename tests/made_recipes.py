@@ -17,7 +17,6 @@ def key(frame, location=(0, 0), rotation=0, scale=1, **more):
 
 
 def is_same(one, other):
-    """Whether two effects are one recipe."""
     return records.recipe_of(one) == records.recipe_of(other)
 
 

@@ -16,56 +16,34 @@ MOST_BYTES = {"README.md": 7_000, "docs/manual.md": 45_000, "docs/developers.md"
 GERMAN = runpy.run_path(ROOT / "shutter_addon" / "blender" / "interface" / "translations" / "german.py")["MESSAGES"]
 # What the pages for editors name of Blender and other programs, in italics as our own labels.
 BLENDERS = {
-    *(
-        "2D Stabilization",
-        "Alpha Over",
-        "Annotate Polygon",
-        "Cryptomatte",
-        "File Output",
-        "Frame Dropping",
-        "Generated",
-        "Keyframe Type",
-    ),
-    *("Line Width", "Pass Index", "Rendered", "Replace", "Resolution Scale", "Single Image", "Standard", "Sync"),
-    *("ACES", "ADX", "AgX", "Khronos PBR Neutral", "Big Buck Bunny"),
+    *("2D Stabilization", "Alpha Over", "Annotate Polygon", "Cryptomatte", "File Output", "Frame Dropping"),
+    *("Generated", "Keyframe Type", "Line Width", "Pass Index", "Rendered", "Replace", "Resolution Scale"),
+    *("Single Image", "Standard", "Sync", "ACES", "ADX", "AgX", "Khronos PBR Neutral", "Big Buck Bunny"),
 }
 
 
 def prose(page):
-    """A page's text without its blocks of code."""
     return re.sub(r"(?ms)^```.*?^```$", "", page.read_text(encoding="utf-8"))
 
 
 def anchors(page):
-    """What its headings are called in links, as GitHub and its like make it of them."""
     headings = re.findall(r"(?m)^#+ (.+)$", prose(page))
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_links_lead_somewhere(page):
-    for link in re.findall(r"\]\(([^)]+)\)", prose(page)):
-        if link.startswith("https://"):
-            continue
-        name, _, anchor = link.partition("#")
-        target = (page.parent / name).resolve() if name else page
-        assert target.exists(), link
-        assert not anchor or anchor in anchors(target), link
-
-
-def test_every_page_and_picture_is_linked():
-    linked = {
-        (page.parent / link.partition("#")[0]).resolve()
-        for page in PAGES
-        for link in re.findall(r"\]\(([^)]+)\)", prose(page))
-        if not link.startswith("#")
-    }
-    files = {path for path in (ROOT / "docs").rglob("*") if path.is_file()}
-    assert not files - linked
+def test_links_lead_somewhere_and_every_page_and_picture_is_linked():
+    linked = set()
+    for page in PAGES:
+        for link in re.findall(r"\]\((?!https://)([^)]+)\)", prose(page)):
+            name, _, anchor = link.partition("#")
+            target = (page.parent / name).resolve() if name else page
+            assert target.exists(), f"{link} in {page.name}"
+            assert not anchor or anchor in anchors(target), f"{link} in {page.name}"
+            linked |= {target} if name else set()
+    assert not {path for path in (ROOT / "docs").rglob("*") if path.is_file()} - linked
 
 
 def test_what_the_page_of_developers_says_where_to_look_is_there():
-    """Each file, and each name that stands in brackets behind one."""
     page = (ROOT / "docs" / "developers.md").read_text(encoding="utf-8")
     rows = page.partition("| Looking for | Open |")[2].partition("\n\n")[0].splitlines()[2:]
     assert len(rows) > 30
@@ -82,7 +60,6 @@ def test_what_the_page_of_developers_says_where_to_look_is_there():
 
 
 def test_files_that_pages_name_are_there():
-    """In words of code: paths with a folder, and scripts."""
     places = ROOT, ROOT / "shutter_addon", ROOT / "shutter_addon" / "blender", ROOT / "docs"
     for page in PAGES:
         if page.name == "CHANGELOG.md":  # it may name what is gone

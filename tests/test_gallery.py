@@ -3,6 +3,7 @@
 import dataclasses
 import re
 import runpy
+import subprocess
 import sys
 from pathlib import Path
 
@@ -10,8 +11,8 @@ import numpy as np
 import pytest
 from OpenImageIO import ImageBuf
 
-from gallery import NAMES, bunny, rolling_repair, time_map
-from gallery.item import HERE, ROOT, Shot
+from gallery import NAMES, bunny, rolling_repair, stills, time_map
+from gallery.item import ASSETS, HERE, ROOT, Shot
 from gallery.matte_contents import with_contents
 from shutter_addon.compute.renderer import Renderer, open_compositor
 from shutter_addon.compute.request import Request
@@ -37,7 +38,6 @@ HEAD, ARM, MEADOW = np.s_[130:230, 430:530], np.s_[110:230, 250:330], np.s_[500:
     ],
 )
 def test_names_need_no_blender(arguments, code, said, tmp_path, monkeypatch, capsys):
-    """The list of items, and a sentence for what is not there."""
     (tmp_path / "file").touch()
     monkeypatch.chdir(tmp_path)
     for module in [name for name in sys.modules if name.startswith("gallery.")]:
@@ -89,19 +89,8 @@ def test_an_item_from_end_to_end(tmp_path, monkeypatch):
     assert still.std() > 0.1
 
 
-def rows_of_time(height, width):
-    """When a pixel is seen, in frames since the shown one, as time runs down."""
-    return np.broadcast_to((np.arange(height)[:, None] + 0.5) / height * 32, (height, width))
-
-
-def angles_of_time(height, width):
-    """The same, as time runs around a point, clockwise from its top."""
-    y, x = np.mgrid[:height, :width] + 0.5
-    return np.degrees(np.arctan2(x - 0.35 * width, 0.45 * height - y)) % 360 / 360 * 32
-
-
-@pytest.mark.parametrize(("name", "times"), [("time_map", rows_of_time), ("time_map-angle", angles_of_time)])
-def test_time_maps_are_frames_put_together(name, times):
+@pytest.mark.parametrize("name", ["time_map", "time_map-angle"])
+def test_time_maps_are_frames_put_together(name):
     """A pixel whose time is a whole frame's is that frame's to the bit, and others mix the two frames around."""
     source, effect = open_source(time_map.ITEM.footage(None)), recipe_file.load(HERE / f"{name}.json")
     height, width, shown = source.height, source.width, time_map.FRAME - 1
@@ -109,7 +98,10 @@ def test_time_maps_are_frames_put_together(name, times):
     request = Request(shown, with_contents(effect.for_picture(width / height)).at(time_map.FRAME))
     made = light.to_encoded(renderer.picture(request)[..., :3]) * 255
     frames = np.stack([source.read(shown + k)[..., :3] for k in range(33)])
-    time, (y, x) = times(height, width), np.mgrid[:height, :width]
+    y, x = np.mgrid[:height, :width]
+    # When a pixel is seen, in frames since the shown one: from top to bottom, or clockwise around a point.
+    turn = np.degrees(np.arctan2(x + 0.5 - 0.35 * width, 0.45 * height - y - 0.5)) % 360 / 360
+    time = 32 * (turn if name == "time_map-angle" else (y + 0.5) / height)
     before = np.floor(time).astype(int)
     share = (time - before)[..., None]
     first, second = (light.to_linear(frames[before + k, y, x] / 255) for k in (0, 1))
@@ -117,3 +109,21 @@ def test_time_maps_are_frames_put_together(name, times):
     whole = time == before
     assert whole.any()
     assert np.array_equal(np.rint(made[whole]), frames[before, y, x][whole])
+
+
+def test_a_contact_sheet_of_two_frames(tmp_path):
+    """The source stands for the result as well: so the first and the last picture of a row are alike."""
+    film = ASSETS / "bigbuckbunny.mp4"
+    arguments = film, ASSETS / "bunny.json", film, tmp_path / "sheet.png", 6, 45
+    command = [sys.executable, ROOT / "scripts" / "contact_sheet.py", *map(str, arguments)]
+    subprocess.run(command, cwd=ROOT, check=True)
+    assert [path.name for path in tmp_path.iterdir()] == ["sheet.png"]
+    sheet = ImageBuf(str(tmp_path / "sheet.png")).get_pixels()
+    height = (sheet.shape[0] - stills.GAP) // 2
+    for top in (stills.GAP, stills.GAP + height):
+        row = sheet[top : top + 200, stills.GAP :]
+        source, scribbles, coefficients, result = (part[:, :380] for part in np.split(row, 4, axis=1))
+        np.testing.assert_allclose(result.mean(axis=(0, 1)), source.mean(axis=(0, 1)), atol=0.01)
+        assert np.abs(scribbles - source).mean() > 0.1
+        np.testing.assert_allclose(coefficients[100, 10], (0.2, 0.5, 1.0), atol=0.02)  # the long shutter's colour
+        assert np.ptp(coefficients, axis=(0, 1)).max() > 0.5, "the face has another shutter"

@@ -64,7 +64,6 @@ def test_a_stopped_render_goes_on(tmp_path):
 
 @pytest.fixture(scope="module")
 def footage(tmp_path_factory):
-    """The folder of all footage, and the pictures by name."""
     names, folder = (*SCENES, "object_matte"), tmp_path_factory.mktemp("scenes")
     said = run(FIRST_FRAME, folder, *names).splitlines()
     paths = [path for before, path in pairwise(said) if before == "FOOTAGE"]

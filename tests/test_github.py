@@ -31,6 +31,13 @@ STAND_INS = {
 
 
 RUNNERS = ("GITHUB_ENV", "GITHUB_REF_NAME", "GITHUB_WORKSPACE", "RUNNER_TEMP")
+# In place of scripts/build.py.
+BUILD = """
+import pathlib, sys
+assert sys.argv[1] == "--system"
+pathlib.Path("dist").mkdir()
+pathlib.Path(f"dist/virtual_shutter-0.1.0-{sys.argv[2].replace('-', '_')}.zip").touch()
+"""
 # What a step writes for those after it.
 GIVEN_ON = '\nset -a; . "$GITHUB_ENV"; set +a\n'
 
@@ -65,15 +72,8 @@ def checkout(tmp_path):
         if path.name not in (".git", "build", "dist", "out", "scripts"):
             (folder / path.name).symlink_to(path)
     (folder / "scripts").mkdir()
-    (folder / "scripts" / "build.py").write_text('import sys; assert sys.argv[1] == "--system"\n' + ZIPPED)
+    (folder / "scripts" / "build.py").write_text(BUILD)
     return folder
-
-
-ZIPPED = """
-import pathlib
-pathlib.Path("dist").mkdir()
-pathlib.Path(f"dist/virtual_shutter-0.1.0-{sys.argv[2].replace('-', '_')}.zip").touch()
-"""
 
 
 @pytest.mark.parametrize("system", SYSTEMS, ids=lambda system: system["system"])
@@ -111,10 +111,9 @@ def test_windows_path_to_blender_is_one_for_a_posix_shell(tmp_path):
 
 def test_the_commands_of_a_release(checkout, tmp_path):
     """It has a Blender, and the checkout is as clean as a release asks for."""
-    (checkout / "scripts" / "release").write_text(
-        '#!/bin/sh\necho "release $*" >>"$TOLD"; ls -A >"$RUNNER_TEMP/files"\n'
-    )
-    (checkout / "scripts" / "release").chmod(0o755)
+    script = checkout / "scripts" / "release"
+    script.write_text('#!/bin/sh\necho "release $*" >>"$TOLD"; ls -A >"$RUNNER_TEMP/files"\n')
+    script.chmod(0o755)
     (tmp_path / "temporary").mkdir()
     before, job = {path.name for path in checkout.iterdir()}, JOBS["release-release"]
     environment = {"GITHUB_REF_NAME": "v0.1.0", "RUNNER_TEMP": str(tmp_path / "temporary"), "ARCHIVE": "blender.tar.xz"}
@@ -145,9 +144,8 @@ def test_what_blender_and_the_builder_are_given_is_understood(monkeypatch):
 
 
 def lines_with(word):
-    return [
-        line.strip() for job in JOBS.values() for line in commands(job).splitlines() if line.strip().startswith(word)
-    ]
+    lines = [line.strip() for job in JOBS.values() for line in commands(job).splitlines()]
+    return [line for line in lines if line.startswith(word)]
 
 
 def test_the_tests_that_are_asked_for_are_there():

@@ -5,8 +5,6 @@ What features are: shutter_addon/features/__init__.py.
 
 import ast
 import re
-import subprocess
-import sys
 from functools import cache
 from pathlib import Path
 
@@ -17,7 +15,6 @@ PACKAGE = Path(__file__).parents[1] / "shutter_addon"
 
 @cache
 def parsed(path):
-    """All nodes of a file's tree."""
     return list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
 
 
@@ -117,16 +114,6 @@ def test_no_absolute_import_of_the_package():
     """An installed extension has another name."""
     for path in PACKAGE.rglob("*.py"):
         assert "shutter_addon" not in imported(path), path
-
-
-def test_they_run_without_bpy():
-    code = """
-import sys
-sys.modules["bpy"] = sys.modules["gpu"] = None
-import shutter_addon.core.recipes.recipe, shutter_addon.core.pixels.compositor, shutter_addon.core.model.shutters
-import shutter_addon.media, shutter_addon.compute.renderer, shutter_addon.compute.gpu
-"""
-    subprocess.run([sys.executable, "-c", code], check=True, cwd=PACKAGE.parent)
 
 
 def test_the_extensions_root_imports_lazily():

@@ -16,7 +16,6 @@ import outline_scenes
 
 
 def rows_of(name, folder, *options):
-    """What a script measures."""
     command = [sys.executable, f"scripts/{name}.py", *map(str, options), "--json", folder / "rows.json"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
@@ -94,7 +93,6 @@ def test_blocks_that_share_a_shutter_look_like_full_resolution(tmp_path):
 
 
 def test_coefficients_that_follow_edges_change_by_less_than_a_level(tmp_path):
-    """Where the film stands still."""
     options = "--frames", "2", "--aggregate", "4", "--noise", "8", "--films", "pedestrians.avi"
     rows = {row["guide"]: row for row in rows_of("edge_flicker", tmp_path, *options)}
     assert rows["steadied"]["still"] > 0.5

@@ -44,20 +44,19 @@ SIZE = 320, 180
 NO_OPENGL = {"LIBGL_DRIVERS_PATH": "/nowhere", "__EGL_VENDOR_LIBRARY_DIRS": "/nowhere"}
 
 
-def built(*arguments, root=ROOT):
-    command = [sys.executable, root / "scripts" / "build.py", *map(str, arguments)]
+def built(*arguments):
+    command = [sys.executable, ROOT / "scripts" / "build.py", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
-def build(*arguments, root=ROOT):
-    done = built(*arguments, root=root)
+def build(*arguments):
+    done = built(*arguments)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
 
 @pytest.fixture(scope="module")
 def dist(tmp_path_factory):
-    """All zips for official builds of Blender, and what was said of them."""
     folder = tmp_path_factory.mktemp("dist")
     return folder, build("--output", folder)
 
@@ -94,10 +93,11 @@ def test_the_zip_without_wheels_holds_the_extension_alone(dist):
     assert len(manifest["copyright"]) == 2  # ours, and the model's
 
 
-@pytest.mark.parametrize(
-    ("system", "tag"), [("linux_x64", "x86_64"), ("windows_x64", "win_amd64"), ("macos_arm64", "arm64")]
-)
-def test_a_zip_with_wheels_holds_those_of_its_system(dist, system, tag):
+TAGS = {"linux_x64": "x86_64", "windows_x64": "win_amd64", "macos_arm64": "arm64"}
+
+
+@pytest.mark.parametrize("system", TAGS)
+def test_a_zip_with_wheels_holds_those_of_its_system(dist, system):
     (path,) = dist[0].glob(f"*-{system}.zip")
     names, manifest = members(path)
     wheels = {name for name in names if name.startswith("wheels/")}
@@ -107,26 +107,23 @@ def test_a_zip_with_wheels_holds_those_of_its_system(dist, system, tag):
     assert {name.split("/")[1].split("-")[0] for name in wheels} == WHEELS | own
     for name in wheels:
         python, abi, platform = name.removesuffix(".whl").split("-")[-3:]
-        assert platform == "any" or platform.endswith(tag)
+        assert platform == "any" or platform.endswith(TAGS[system])
         assert (python, abi) in {("cp313", "cp313"), ("cp312", "abi3"), ("cp37", "abi3"), *PURE}
     assert manifest["platforms"] == [system.replace("_", "-")]
     assert {wheel.removeprefix("./") for wheel in manifest["wheels"]} == wheels
 
 
-@pytest.mark.parametrize(
-    ("system", "some"),
-    [
-        ("linux_x64", ["libxcb", "OpenBLAS", "Intel IPP"]),
-        ("windows_x64", ["OpenH264", "Colorama", "Intel IPP"]),
-        ("macos_arm64", ["OpenSSL", "Rubber Band", "KleidiCV"]),
-    ],
-)
-def test_a_zip_names_the_holders_and_has_the_texts_of_what_it_bundles(dist, system, some):
+SOME = {"linux_x64": ["libxcb", "OpenBLAS", "Intel IPP"], "windows_x64": ["OpenH264", "Colorama", "Intel IPP"]}
+SOME |= {"macos_arm64": ["OpenSSL", "Rubber Band", "KleidiCV"]}
+
+
+@pytest.mark.parametrize("system", SOME)
+def test_a_zip_names_the_holders_and_has_the_texts_of_what_it_bundles(dist, system):
     (path,) = dist[0].glob(f"*-{system}.zip")
     names, manifest = members(path)
     with zipfile.ZipFile(path) as packed:
         listed = packed.read("licenses/README.txt").decode()
-    for name in ("PyAV", "OpenCV", "FFmpeg", "x264", "x265", "tqdm", *some):
+    for name in ("PyAV", "OpenCV", "FFmpeg", "x264", "x265", "tqdm", *SOME[system]):
         assert any(line.endswith(f"({name})") for line in manifest["copyright"]), name
         assert re.search(rf"^ *{re.escape(name)}\b", listed, re.MULTILINE), name
     assert manifest["copyright"][0].endswith("Virtual Shutter developers")
@@ -139,7 +136,10 @@ def test_a_zip_names_the_holders_and_has_the_texts_of_what_it_bundles(dist, syst
     assert "LICENSE" in names  # the GPL, version 3
 
 
-def test_wheels_that_are_not_to_be_had_are_one_sentence(tmp_path):
+def test_what_cannot_be_built_is_one_sentence(tmp_path):
+    done = built("--output", tmp_path, "--repository", tmp_path)
+    assert (done.returncode, list(tmp_path.iterdir())) == (2, [])
+    assert done.stderr.endswith("--repository: it needs a folder of its own\n")
     done = built("--output", tmp_path, "--python", "3.x", "--system", SYSTEM)
     assert done.returncode == 2
     assert done.stderr == f"build: no wheels for Python 3.x on {SYSTEM}, or PyPI is not reached\n"
@@ -155,7 +155,6 @@ print(*build.download(sys.argv[1], build.BLENDERS_PYTHON), sep="\\n")
 
 
 def downloading(root, offered):
-    """A process that gets the wheels of this system, of a folder in place of PyPI."""
     environment = os.environ | {"PIP_NO_INDEX": "1", "PIP_FIND_LINKS": str(offered)}
     command, pipe = [sys.executable, "-c", DOWNLOAD, SYSTEM], subprocess.PIPE
     return subprocess.Popen(command, env=environment, cwd=root / "scripts", stdout=pipe, stderr=pipe, text=True)
@@ -192,13 +191,6 @@ def test_downloaded_wheels_are_whole_and_known(dist, tmp_path):
     assert len(list((bare / "build" / "wheels").iterdir())) == 1
 
 
-def test_a_repository_is_no_output_folder(tmp_path):
-    done = built("--output", tmp_path, "--repository", tmp_path)
-    assert done.returncode == 2
-    assert done.stderr.endswith("--repository: it needs a folder of its own\n")
-    assert not list(tmp_path.iterdir())
-
-
 def test_the_version_is_the_same_everywhere():
     version = tomllib.loads((ROOT / "blender_manifest.toml").read_text())["version"]
     assert tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"] == version
@@ -219,20 +211,14 @@ import sys
 sys.modules |= dict.fromkeys(("av", "cattrs", "moderngl"))
 from shutter_addon.compute.renderer import open_compositor
 from shutter_addon.core.recipes import recipe_file
-from shutter_addon.devices.device import NoDeviceError
 from shutter_addon.media import MediaError, open_source
 
 assert open_compositor("cpu").name == "NumPy"
 recipe = '{"version": 1, "window": 1, "shutters": [{"name": "S", "bars": [1]}]}'
-for function, argument in (
-    (open_source, "assets/bigbuckbunny.mp4"),
-    (open_source, "none.mp4"),
-    (recipe_file.parse, recipe),
-    (open_compositor, "gpu"),
-):
+for function, argument in ((open_source, "none.mp4"), (recipe_file.parse, recipe)):
     try:
         function(argument)
-    except (MediaError, NoDeviceError, recipe_file.RecipeError) as error:
+    except (MediaError, recipe_file.RecipeError) as error:
         print(error)
 """
 
@@ -240,16 +226,12 @@ for function, argument in (
 def test_what_needs_a_package_that_is_missing_is_one_sentence():
     command = [sys.executable, "-c", WITHOUT]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
-    movie, none, recipe, opengl = done.stdout.splitlines()
-    assert movie.startswith("bigbuckbunny.mp4: movies need the Python package PyAV")
+    none, recipe = done.stdout.splitlines()
     assert none.startswith("none.mp4: no such file")
     assert "recipes need the Python package cattrs" in recipe
-    assert opengl.startswith("the Python package moderngl cannot be loaded")
 
 
 class Installation:
-    """A real Blender with user folders of its own."""
-
     def __init__(self, command, folder):
         self.command = command
         self.user = folder / "Größe und Maß" / "ユーザー"
@@ -258,14 +240,9 @@ class Installation:
 
     def run(self, *arguments, code=0, says=(), environment=()):
         """Runs Blender; what it printed. Nothing may stand on stderr but the sentences that are expected."""
-        done = subprocess.run(
-            [*self.command, *map(str, arguments)],
-            env=os.environ | {"BLENDER_USER_RESOURCES": str(self.user)} | dict(environment),
-            capture_output=True,
-            text=True,
-            check=False,
-            cwd=ROOT,
-        )
+        command = [*self.command, *map(str, arguments)]
+        environment = os.environ | {"BLENDER_USER_RESOURCES": str(self.user)} | dict(environment)
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False, cwd=ROOT)
         assert done.returncode == code, done.stdout + done.stderr
         said = [line for line in done.stderr.splitlines() if line and not any(own in line for own in BLENDERS_OWN)]
         assert len(said) == len(says), done.stderr
@@ -298,7 +275,6 @@ class Installation:
             folder.chmod(0o755)
 
     def remove(self):
-        """Disables the extension, then takes it away."""
         disable = f"import addon_utils; addon_utils.disable('{NAME}', default_set=True)"
         self.run("-b", "--python-exit-code", "1", "--python-expr", disable)
         self.run("--command", "extension", "remove", "virtual_shutter")
@@ -321,7 +297,6 @@ def recipe(tmp_path):
 
 @pytest.fixture(scope="module")
 def film(bunny, tmp_path_factory):
-    """The bunny's first frames, small."""
     path = tmp_path_factory.mktemp("film") / "bunny.mp4"
     with av.open(str(bunny)) as movie, av.open(str(path), "w") as out:
         small = out.add_stream("libx264", rate=25, options={"crf": "12"})
@@ -352,7 +327,6 @@ def assert_alike(folder, expected, count):
 
 @pytest.fixture(scope="module")
 def repository(blenders_python, tmp_path_factory):
-    """A repository of the zip for the real Blender, and that zip."""
     folder, place = tmp_path_factory.mktemp("dist"), tmp_path_factory.mktemp("repository")
     build("--output", folder, "--python", blenders_python, "--system", SYSTEM, "--repository", place)
     (path,) = folder.glob(f"*-{SYSTEM.replace('-', '_')}.zip")
@@ -360,7 +334,6 @@ def repository(blenders_python, tmp_path_factory):
 
 
 def test_installed_with_wheels(blender, repository, film, recipe, tmp_path):
-    """A movie, from the zip to rendered frames, and gone again."""
     blender.install(repository[1])
     files = blender.files()
     edit = tmp_path / "edit.blend"

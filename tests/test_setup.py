@@ -46,32 +46,26 @@ class Machine:
         shutil.copy(SCRIPTS / "setup", folder / "scripts")
         self.fetch_uv("raise SystemExit('PyPI is not reached')")
 
-    def script(self, path, text):
+    def script(self, path, text, **given):
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text)
+        path.write_text(text.format(**given))
         path.chmod(0o755)
         return path
 
     def python(self, name, version, ensurepip=True, folder=None):
-        other = OTHER.format(python=sys.executable, version=version, ensurepip=ensurepip)
-        return self.script((folder or self.path) / name, other)
+        given = {"python": sys.executable, "version": version, "ensurepip": ensurepip}
+        return self.script((folder or self.path) / name, OTHER, **given)
 
-    def uv(self, path, brings="/nowhere"):
-        return self.script(path, UV.format(brings=brings))
+    def uv(self, path, brings):
+        return self.script(path, UV, brings=brings)
 
     def fetch_uv(self, code):
         (self.folder / "scripts" / "fetch_uv.py").write_text(code)
 
     def find(self, **environment):
-        """The Python that is chosen, or None, and what is said of it."""
-        done = subprocess.run(
-            [shutil.which("bash"), "-c", "source scripts/setup; find_python"],
-            cwd=self.folder,
-            env={"PATH": str(self.path), "HOME": str(self.home)} | environment,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        command = [shutil.which("bash"), "-c", "source scripts/setup; find_python"]
+        environment = {"PATH": str(self.path), "HOME": str(self.home)} | environment
+        done = subprocess.run(command, cwd=self.folder, env=environment, capture_output=True, text=True, check=False)
         assert bool(done.stdout) == (done.returncode == 0), done.stderr
         return Path(done.stdout.strip()) if done.stdout else None, done.stderr
 
@@ -114,9 +108,7 @@ def test_without_a_python_it_is_one_sentence(machine):
     machine.python("python", (2, 7))
     python, said = machine.find()
     assert python is None
-    assert said.startswith(
-        "setup: Python 3.13 is needed (the bpy wheel is built for it), and there is no Python 3.8 or"
-    )
+    assert said.startswith("setup: Python 3.13 is needed (the bpy wheel is built for it), and there is no Python 3.8")
     assert said.count("\n") == 1
 
 
@@ -126,14 +118,11 @@ def test_without_uv_it_says_why(machine):
 
 
 def wheel(folder):
-    """A wheel like that of uv, as pip takes it; its path."""
     path, info = folder / f"uv-{fetch_uv.VERSION}-py3-none-any.whl", f"uv-{fetch_uv.VERSION}.dist-info"
     with zipfile.ZipFile(path, "w") as packed:
         packed.writestr(f"uv-{fetch_uv.VERSION}.data/scripts/uv", "#!/bin/sh\necho uv\n")
         packed.writestr(f"{info}/METADATA", f"Metadata-Version: 2.1\nName: uv\nVersion: {fetch_uv.VERSION}\n")
-        packed.writestr(
-            f"{info}/WHEEL", "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: false\nTag: py3-none-any\n"
-        )
+        packed.writestr(f"{info}/WHEEL", "Wheel-Version: 1.0\nRoot-Is-Purelib: false\nTag: py3-none-any\n")
         packed.writestr(f"{info}/RECORD", "")
     return path
 

@@ -23,30 +23,12 @@ REVIEWED: dict[str, set[str]] = {
     "data/versions.py": {"_digest"},
     "devices/available.py": {"<lambda>", "_tried"},
     "devices/blender_gpu.py": {
-        "BlenderDevice.__init__",
-        "BlenderDevice._cleared",
-        "BlenderDevice.freeing",
-        "BlenderDevice.read",
-        "BlenderDevice.run",
-        "BlenderDevice.run.<genexpr>",
-        "BlenderDevice.send",
-        "BlenderDevice.write",
-        "_buffer",
-        "_packed",
+        *(f"BlenderDevice.{name}" for name in ("__init__", "_cleared", "freeing", "read", "run", "send", "write")),
+        *("BlenderDevice.run.<genexpr>", "_buffer", "_packed"),
     },
     "devices/main_thread.py": {
-        "RelayedDevice.__init__",
-        "RelayedDevice._dispatch",
-        "RelayedDevice._free",
-        "RelayedDevice._make",
-        "RelayedDevice._read",
-        "RelayedDevice._send",
-        "RelayedDevice._wait_for",
-        "RelayedDevice.current",
-        "RelayedDevice.release",
-        "_called",
-        "ask",
-        "soon",
+        *(f"RelayedDevice.{name}" for name in ("__init__", "_dispatch", "_free", "_make", "_read", "_send")),
+        *("RelayedDevice.current", "RelayedDevice._wait_for", "RelayedDevice.release", "_called", "ask", "soon"),
     },
     "editing/track_region.py": {"_each", "track.<lambda>"},
     "rendering/outline_carrying.py": {"_Carrying._carry"},
@@ -75,7 +57,6 @@ def on(reviewed_alone: bool = True) -> None:
 
 
 def faults() -> list[str]:
-    """What was found since the last call."""
     found = list(_faults)
     _faults.clear()
     return found
@@ -126,7 +107,6 @@ _known: dict[str, str | None] = {}
 
 
 def _below(file: str) -> str | None:
-    """A file's place in the package."""
     if file not in _known:
         _before, package, below = file.replace(os.sep, "/").rpartition(f"/{_PACKAGE}/")
         _known[file] = below if package else None

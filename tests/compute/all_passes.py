@@ -3,14 +3,7 @@
 import importlib.util
 import itertools
 
-from shutter_addon.compute import (
-    composition_passes,
-    diffusion_gpu,
-    edge_diffusion_gpu,
-    gpu,
-    running_sums,
-    stages,
-)
+from shutter_addon.compute import composition_passes, diffusion_gpu, edge_diffusion_gpu, gpu, running_sums, stages
 from shutter_addon.compute.composition_passes import MODES, composition
 from shutter_addon.core.model.frame_state import AVERAGE, Combine
 from shutter_addon.devices.passes import Pass, read_pass

@@ -51,7 +51,6 @@ def blender_device():
 
 @pytest.fixture(params=["moderngl", "blender"])
 def gpu_device(request):
-    """Either device on a GPU."""
     if request.param == "blender":
         yield request.getfixturevalue("blender_device")
         return
@@ -74,7 +73,6 @@ def on_moderngl():
 
 @pytest.fixture(scope="module")
 def on_blender(blender_device):
-    """The same, on Blender's own GPU."""
     yield from _solving(blender_device)
 
 

@@ -16,6 +16,7 @@ from shutter_addon.compute.request import Request
 from shutter_addon.core.frames.frame_source import FrameSource
 from shutter_addon.devices import device as devices
 from shutter_addon.devices.device import Budget, NoDeviceError
+from shutter_addon.devices.gl import GLDevice
 
 SIZE = 128, 72
 PIXELS = SIZE[0] * SIZE[1]
@@ -27,15 +28,7 @@ BESIDE = 16 * 6 + 4
 
 @pytest.fixture(params=["moderngl", "blender"], scope="module")
 def kind(request):
-    """A class of devices."""
-    if request.param == "moderngl":
-        from shutter_addon.devices.gl import GLDevice
-
-        return GLDevice
-    request.getfixturevalue("blender_device")
-    from shutter_addon.blender.devices.blender_gpu import BlenderDevice
-
-    return BlenderDevice
+    return GLDevice if request.param == "moderngl" else type(request.getfixturevalue("blender_device"))
 
 
 @pytest.fixture(scope="module")
@@ -174,16 +167,14 @@ def test_several_effects_take_turns_and_show_the_same(limited):
             assert compositor.windows[-1].is_open
     assert len(compositor.windows) == 6
     assert sum(each.is_open for each in compositor.windows) == 1
-    assert np.array_equal(
-        renderers[0].picture(Request(3, moment())), alone[0][1]
-    )  # its last one, whose texture was freed
+    last = renderers[0].picture(Request(3, moment()))  # whose texture was freed
+    assert np.array_equal(last, alone[0][1])
     for renderer in renderers:
         renderer.close()
     free(compositor)
 
 
 def test_pictures_do_not_depend_on_those_before(limited):
-    """Kinds of windows and of diffusion, in turn, with little room."""
     source, rng = film(), np.random.default_rng(7)
     shown = [moment(), following(rng, source, moment(), (0, 1)), moment(shapes=()), moment(edge_aware=0.5)]
     limit = PIXELS * (FRAMES + BESIDE)

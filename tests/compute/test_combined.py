@@ -4,27 +4,14 @@ import dataclasses
 
 import numpy as np
 import pytest
-from test_composition import SHAPES, check, footage, state
+from test_composition import check, footage, state
 
 from shutter_addon.core.model.frame_state import Combine, Following
 from shutter_addon.core.pixels import compositor
 
-LIGHTEST, DARKEST, MEDIAN = (Combine(mode) for mode in ("lightest", "darkest", "median"))
-MODES = {
-    "lightest": LIGHTEST,
-    "darkest": DARKEST,
-    "median": MEDIAN,
-    "by luminance": Combine("lightest", by_luminance=True),
-    "dark by luminance": Combine("darkest", by_luminance=True),
-    "threshold": Combine("lightest", threshold=0.4, softness=0.3),
-    "dark threshold": Combine("darkest", True, threshold=0.2, softness=0.1),
-}
-
 
 def combining(rng, *combines, window=9, **options):
-    options.setdefault("shapes", tuple(shape for shape in SHAPES if shape.shutter < len(combines)))
-    moment = state(rng, window, count=len(combines), **options)
-    return dataclasses.replace(moment, combines=combines)
+    return dataclasses.replace(state(rng, window, (), len(combines), **options), combines=combines)
 
 
 @pytest.mark.parametrize("mode", ["lightest", "darkest", "median"])
@@ -32,7 +19,7 @@ def combining(rng, *combines, window=9, **options):
 def test_windows_of_any_length(device, mode, window):
     """A long median of any light takes more iterations than a software renderer has."""
     rng = np.random.default_rng(window)
-    moment = combining(rng, *[MODES[mode]] * 2, window=window, shapes=())
+    moment = combining(rng, *[Combine(mode)] * 2, window=window)
     kind = {"dtype": np.float32, "transfer": "linear"} if (mode, window) == ("median", 256) else {}
     check(device, footage(rng, count=window + 3, size=(9, 7), **kind), moment, 1)
 
@@ -41,7 +28,7 @@ def test_windows_of_any_length(device, mode, window):
 def test_the_shown_frame_may_be_left_out(device, follows):
     """Played in reverse, a filmed frame begins with its last moment, which the clip's end does not have."""
     rng = np.random.default_rng(6)
-    moment = combining(rng, MODES["threshold"], shapes=(), edges="shorten", step=4)
+    moment = combining(rng, Combine("lightest", threshold=0.4, softness=0.3), edges="shorten", step=4)
     if follows:
         shifts = np.arange(20)[:, None] * (0.7 - 0.3j)
         moment = dataclasses.replace(moment, following=Following(0, np.ones((20, 1), complex), shifts))

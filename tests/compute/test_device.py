@@ -8,14 +8,8 @@ import pytest
 
 from shutter_addon.devices.device import NoDeviceError
 
-KINDS = {
-    "rgba8": np.uint8,
-    "rgba16": np.uint16,
-    "rgba16f": np.float16,
-    "rgba32f": np.float32,
-    "r32f": np.float32,
-    "r32ui": np.uint32,
-}
+KINDS = {"rgba8": np.uint8, "rgba16": np.uint16, "rgba16f": np.float16, "rgba32f": np.float32, "r32f": np.float32}
+KINDS |= {"r32ui": np.uint32}
 
 
 def samples(kind, *shape):

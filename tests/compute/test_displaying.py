@@ -40,7 +40,6 @@ def test_levels_are_the_displays(gpu_device, transfer, dither):
 
 
 def test_the_display_is_asked_about_few_pixels(gpu_device):
-    """And it is sent anew where another one follows."""
     asked, light = [], next(pictures())
     for transfer in TRANSFERS.values():
 

@@ -4,15 +4,14 @@ import dataclasses
 
 import numpy as np
 import pytest
-from test_composition import LEVEL, Footage, few_pieces
+from test_composition import LEVEL, Footage, composed, few_pieces
 
 from shutter_addon.compute import running_sums
 from shutter_addon.compute.renderer import Renderer
 from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
-from shutter_addon.core.model import shutters, windows
+from shutter_addon.core.model import shutters
 from shutter_addon.core.model.frame_state import FrameState, Options
-from shutter_addon.core.pixels import compositor
 from shutter_addon.features.smooth.smooth import SmoothSource
 
 STEPS = 4
@@ -31,33 +30,17 @@ def film(rng, count=6, size=(53, 38), dtype=np.uint8):
         frame[2:8, 4:14, :3] = wide[:6, :10]
     frames[..., 3] = 255
     most = np.iinfo(dtype).max if np.dtype(dtype).kind == "u" else 1
-    found = Footage((frames / 255 * most).round(0 if most > 1 else 6).astype(dtype))
-    found.fps, found.options = None, {}
-    return found
+    return Footage((frames / 255 * most).round(0 if most > 1 else 6).astype(dtype))
 
 
-def compared(device, source, moment, index, direction=1):
-    """A device's picture, and the reference's of the same frames and moments as they are read."""
-    renderer = Renderer(device, source)
-    asked = Request(index, moment, direction)
-    picture, mix = renderer.picture(asked), renderer.coefficients(asked).astype(float)
-    renderer.release()
-    frames = np.stack([source.read(k) for k in range(source.count)])
-    moment = windows.slid(moment, index, direction, range(source.count))
-    indices = windows.indices(moment.options, index, range(source.count), direction)
-    seen = Footage(frames).linear()[np.maximum(indices, 0)]
-    return picture, compositor.compose(moment, seen, indices >= 0, mix / mix.sum(axis=0))
+class Moments(SmoothSource):
+    """With all its frames for the reference, as Footage has them."""
 
-
-def check(device, source, moment, index, direction=1, most=LEVEL):
-    picture, expected = compared(device, source, moment, index, direction)
-    difference = np.abs(light.to_encoded(picture.astype(np.float64)) - light.to_encoded(expected))
-    assert difference.max() <= most
-    return picture
+    def linear(self):
+        return Footage(np.stack([self.read(k) for k in range(self.count)])).linear()
 
 
 def smooth(moment, steps=STEPS, direction=1):
-    """The state of filmed frames, in moments."""
     bars = np.stack([shutters.smoothed(row, steps, backward=direction < 0) for row in moment.bars])
     return dataclasses.replace(
         moment, bars=bars, options=dataclasses.replace(moment.options, window=len(bars[0]), step=steps)
@@ -79,11 +62,10 @@ def test_a_moment_alone(device, size, steps):
 
 
 def repeating(steps):
-    """A film some of whose frames are shown twice, and one three times."""
     found = film(np.random.default_rng(8))
     found.frames = found.frames[[0, 1, 1, 2, 3, 3, 3, 4, 5]]
     found.count = len(found.frames)
-    return SmoothSource(found, steps, skip_repeats=True)
+    return Moments(found, steps, skip_repeats=True)
 
 
 @pytest.mark.parametrize("steps", [2, 8])
@@ -99,7 +81,9 @@ def test_across_repeated_frames(device, steps):
     alone = FrameState(Options(1, step=steps), np.ones((1, 1)))
     for shown, frames in ((moment, (1, 2, 4, 6)), (alone, (2, 5, 6))):
         for index in frames:
-            check(device, source, shown, index * steps, most=1.1 * LEVEL)  # as one moment alone may be rounded
+            picture, expected = composed(device, source, shown, index * steps)
+            apart = np.abs(light.to_encoded(picture.astype(np.float64)) - light.to_encoded(expected))
+            assert apart.max() <= 1.1 * LEVEL  # as one moment alone may be rounded
     assert source.repeats
 
 

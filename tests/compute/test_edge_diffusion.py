@@ -7,11 +7,12 @@ import cv2
 import exact_diffusion
 import numpy as np
 import pytest
+import test_diffusion
+from test_diffusion import LEVEL, scattered
 
 from shutter_addon.compute.cpu import CPUCompositor
 from shutter_addon.core.model.scribbles import Shape, rasterise
 
-LEVEL = 1 / 255
 ASSETS = Path(__file__).parents[2] / "assets"
 WIDTH, HEIGHT = 96, 64
 
@@ -30,10 +31,8 @@ def shapes(seed, shutters=4, width=WIDTH, height=HEIGHT, count=6):
     return rasterise(drawn, width, height)
 
 
-def dots(shutters=5, count=12, width=WIDTH, height=HEIGHT, seed=0):
-    labels, rng = np.zeros((height, width), np.uint16), np.random.default_rng(seed)
-    labels[rng.integers(0, height, count), rng.integers(0, width, count)] = 1 + np.arange(count) % shutters
-    return labels
+def dots(shutters=5, count=12, width=WIDTH, height=HEIGHT):
+    return test_diffusion.dots(count, shutters, width, height)[0]
 
 
 def film(name, index, width=WIDTH, height=HEIGHT, blur=0.5):
@@ -84,7 +83,6 @@ def three_corners(side=64):
 
 
 def one_stroke():
-    """A stroke of one pixel inside, and the border."""
     labels = np.zeros((HEIGHT, WIDTH), np.uint16)
     labels[[0, -1]] = labels[:, [0, -1]] = 1
     labels[25:40, 48] = 2
@@ -100,15 +98,7 @@ def ring_of_a_shutter():
     return labels
 
 
-def scattered(share, shutters=3, width=WIDTH, height=HEIGHT):
-    rng = np.random.default_rng(7)
-    labels = rng.integers(1, shutters + 1, (height, width)) * (rng.random((height, width)) < share)
-    labels[height // 2, width // 2] = 1
-    return labels.astype(np.uint16)
-
-
 def pockets(side, width=160, height=120, seed=5):
-    """Free pockets of side × side pixels in all else, which is fixed."""
     y, x = np.mgrid[:height, :width]
     labels = np.random.default_rng(seed).integers(1, 4, (height, width)).astype(np.uint16)
     labels[(y % (side + 1) > 0) & (x % (side + 1) > 0)] = 0
@@ -138,12 +128,12 @@ SCENES = {
     "spiral": (three_corners(), 3, spiral(7)),
     "narrow maze": (three_corners(), 3, maze(2)),
     "enclosed": (ring_of_a_shutter(), 2, film(*BUNNY)),
-    "half of it fixed": (scattered(0.5), 3, noise(0.3)),
+    "half of it fixed": (*scattered(WIDTH, HEIGHT, 0.5, seed=7), noise(0.3)),
     "single free pixels": (pockets(1), 3, noise(0.3, 160, 120)),
     "pockets in halves": (pockets(7), 3, halves(7)),
     "pockets with noise": (pockets(12), 3, noise(0.03, 160, 120)),
     "odd": (shapes(11, 4, 97, 61), 4, film(*WALKERS, 97, 61)),
-    "1×97": (scattered(0.03, 3, 1, 97), 3, noise(0.3, 1, 97)),
+    "1×97": (*scattered(1, 97, 0.03, seed=7), noise(0.3, 1, 97)),
 }
 
 
@@ -190,7 +180,6 @@ def test_any_strength(scene, strength, solve, exact):
 
 
 def coarse(name, side, width, height):
-    """A film's guide on cells of side × side pixels."""
     return film(*name, -(-width // side), -(-height // side))
 
 
@@ -235,13 +224,3 @@ def test_what_a_shutter_encloses_has_that_one_alone(solve):
     got = solve(labels, count, guide, 1.0)
     np.testing.assert_array_equal(got[1, 21:44, 31:59], 1)
     np.testing.assert_array_equal(got[0, 21:44, 31:59], 0)
-
-
-def test_a_stroke_stays_within_its_object():
-    """What the equations are for: a disc of another colour than the ground, with a line inside."""
-    y, x = np.mgrid[:HEIGHT, :WIDTH]
-    disc = (x - 48) ** 2 + (y - 32) ** 2 < 22**2
-    got = CPUCompositor().solve(one_stroke(), 2, grey(0.4 + 0.2 * disc), 1.0)[1] > 0.5
-    assert (got & disc).sum() / (got | disc).sum() > 0.97
-    plain = CPUCompositor().solve(one_stroke(), 2)[1] > 0.5
-    assert (plain & disc).sum() / (plain | disc).sum() < 0.5

@@ -66,9 +66,8 @@ def test_it_is_the_smoothed_frame(size, block):
 def test_what_is_transparent_is_black(transfer):
     picture, alpha = texture(90, 120), texture(90, 120, 1)[..., :1]
     straight = source_of(np.dstack([picture, alpha]), dtype=np.float32, alpha="straight", transfer=transfer)
-    premultiplied = source_of(
-        np.dstack([picture * alpha, alpha]), dtype=np.float32, alpha="premultiplied", transfer=transfer
-    )
+    shaded = np.dstack([picture * alpha, alpha])
+    premultiplied = source_of(shaded, dtype=np.float32, alpha="premultiplied", transfer=transfer)
     assert np.abs(guide_of(straight) - guide_of(premultiplied)).max() <= LEVEL / 16
     hidden = np.dstack([picture, np.zeros_like(alpha)])
     assert not guide_of(source_of(hidden, alpha="straight", dtype=np.uint16)).any()
@@ -124,7 +123,6 @@ class Cut(ShotSource):
 
 
 def test_nothing_is_taken_from_beyond_a_cut():
-    """Though the shots are much alike, and whatever the window shows."""
     rng = np.random.default_rng(51)
     frames = np.stack([np.roll(film().frames[0], k // 7, axis=1) for k in range(14)])
     frames[7:] -= np.minimum(frames[7:], 4)
@@ -135,11 +133,9 @@ def test_nothing_is_taken_from_beyond_a_cut():
         assert np.array_equal(*found)
 
 
-def reads(moment, *calls) -> list[int]:
+def reads(moment, method) -> list[int]:
     source = film()
-    renderer = Renderer(CPUCompositor(), ShotSource(source))
-    for call in calls:
-        call(renderer, moment)
+    getattr(Renderer(CPUCompositor(), ShotSource(source)), method)(Request(3, moment))
     return source.reads
 
 
@@ -147,19 +143,13 @@ def test_at_0_nothing_more_is_read():
     rng = np.random.default_rng(52)
     still = FrameState(Options(4), np.eye(4)[[0, 0]], SHAPES[:1])  # the frame alone, everywhere
     other = FrameState(Options(4, border=True), still.bars, SHAPES[:1])
-    for moment in (still, other):
-        assert reads(moment, lambda r, m: r.picture(Request(3, m))) == [3]
-    assert reads(other, lambda r, m: r.coefficients(Request(3, m))) == []
+    assert reads(still, "picture") == reads(other, "picture") == [3]
+    assert reads(other, "coefficients") == []
     options = Options(4, border=True, edge_aware=0.5)
-    assert sorted(reads(FrameState(options, still.bars, SHAPES[:1]), lambda r, m: r.coefficients(Request(3, m)))) == [
-        1,
-        2,
-        3,
-        4,
-        5,
-    ]
+    along_edges = FrameState(options, still.bars, SHAPES[:1])
+    assert sorted(reads(along_edges, "coefficients")) == [1, 2, 3, 4, 5]
     everywhere = FrameState(Options(4, edge_aware=0.5), still.bars, SHAPES[:1])  # there is one shutter alone
-    assert reads(everywhere, lambda r, m: r.picture(Request(3, m))) == [3]
+    assert reads(everywhere, "picture") == [3]
     assert guided(rng, 4, 0.0).key != guided(np.random.default_rng(52), 4, 0.5).key
 
 
@@ -175,7 +165,6 @@ def test_frames_of_the_window_are_not_read_again():
 
 
 def test_in_betweens_that_guide_are_needed():
-    """The shown one, and filmed ones beside it; none of another shot."""
     source = with_between()
     renderer = Renderer(CPUCompositor(), ShotSource(source, STEP))
     still = FrameState(Options(1, step=STEP, edge_aware=1.0), np.ones((2, 1)), SHAPES[:1])

@@ -2,6 +2,7 @@
 
 import dataclasses
 import itertools
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -134,7 +135,6 @@ def test_mattes_are_shown_with_those_of_layers(device, aggregate):
 
 
 def test_a_picture_does_not_depend_on_those_before(device):
-    """Neither on where the window was, nor on other mattes or none."""
     rng = np.random.default_rng(5)
     source, base = footage(rng, COUNT, SIZE), drawn_state(rng, window=6)
     first, other = (with_layers(base, discs(top=top))[0] for top in (0.5, 0.8))
@@ -231,10 +231,9 @@ def test_frames_are_uncovered_anew_where_others_change_that_they_are_taken_from(
     moment, other = (with_layers(drawn_state(rng, window=4), each)[0] for each in (matte, further))
     near = moment.layers.mattes
     far = (*near[: SHOWN + 6], *other.layers.mattes[SHOWN + 6 :])
-    moments = [
-        dataclasses.replace(moment, layers=dataclasses.replace(moment.layers, mattes=mattes, camera=camera))
-        for mattes, camera in [(near, still), (far, still), (far, pans), (near, None), (near, still)]
-    ]
+    kinds = (near, still), (far, still), (far, pans), (near, None), (near, still)
+    layers = [dataclasses.replace(moment.layers, mattes=mattes, camera=camera) for mattes, camera in kinds]
+    moments = [dataclasses.replace(moment, layers=each) for each in layers]
     renderer, pictures = Renderer(device, source, MatteValues(*SIZE)), []
     for moment in moments:
         pictures.append(renderer.picture(Request(SHOWN, moment)))
@@ -244,13 +243,8 @@ def test_frames_are_uncovered_anew_where_others_change_that_they_are_taken_from(
 
 def test_a_played_frame_uncovers_one(monkeypatch):
     """Of those whose covered places are taken from others, while the camera's keys and mattes stay."""
-    uncovered, done = layer_frames.uncovered, []
-
-    def counted(*given):
-        done.append(given)
-        return uncovered(*given)
-
-    monkeypatch.setattr(layer_frames, "uncovered", counted)
+    uncovered = mock.Mock(side_effect=layer_frames.uncovered)
+    monkeypatch.setattr(layer_frames, "uncovered", uncovered)
     rng = np.random.default_rng(17)
     source, matte = footage(rng, 60, SIZE), np.zeros((60, *SIZE[::-1]))
     matte[:, 8:15, 6:14] = 0.5
@@ -265,9 +259,9 @@ def test_a_played_frame_uncovers_one(monkeypatch):
             mattes=moment.layers.mattes[:1] * len(frames),
             camera=Following(frames.start, np.ones((12, 1), complex), -0.7 * (np.array(frames)[:, None] - shown) + 0j),
         )
-        done.clear()
+        uncovered.reset_mock()
         renderer.picture(Request(shown, dataclasses.replace(moment, layers=layers)))
-        counts.append(len(done))
+        counts.append(uncovered.call_count)
     assert counts == [6, 1, 1, 1]
 
 
@@ -340,7 +334,6 @@ def test_moments_lie_between_filmed_frames_with_the_colours_of_a_layer(device, m
 
 
 def _encoded(colors, source):
-    """Frames (COUNT, H, W, 4) of a source's samples, of linear colours."""
     whole = np.concatenate([colors, np.ones_like(colors[..., :1])], axis=-1)
     if source.dtype.kind == "f":
         return whole.astype(source.dtype)

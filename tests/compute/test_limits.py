@@ -1,4 +1,4 @@
-"""Passes keep to what every device has on which they may run: the least of OpenGL 4.3, Vulkan 1.3 and Metal."""
+"""Passes suit every device on which they may run: they keep to the least of OpenGL 4.3, Vulkan 1.3 and Metal."""
 
 import math
 import re
@@ -6,7 +6,7 @@ import re
 import pytest
 from all_passes import PASSES, told
 
-from shutter_addon.devices.passes import read_pass
+from shutter_addon.devices.passes import SHADERS, read_pass
 
 # Images, samplers and uniform blocks of a pass; bytes of a block, and of all constants; invocations of a workgroup
 # along each axis, and in all.
@@ -41,9 +41,8 @@ VULKAN_STORES = {
     "rgba16",  # the exception, for frames of 16 bits on Blender's device: others lose bits or take twice the memory
 }
 # What some device lacks, or Blender's Python: 64 and 16 bits, subgroups and their size, memory of a workgroup, atomics.
-MISSING = re.compile(
-    r"\b(?:double|dvec\d|dmat\w+|u?int(?:16|64)_t|shared|barrier|subgroup\w*|gl_Sub\w+|\w*[aA]tomic\w*)\b"
-)
+LACKED = r"double|dvec\d|dmat\w+|u?int(?:16|64)_t|shared|barrier|subgroup\w*|gl_Sub\w+|\w*[aA]tomic\w*"
+MISSING = re.compile(rf"\b(?:{LACKED})\b")
 # Words of C++14 and of the Metal Shading Language that GLSL leaves free: Blender gives Metal our names as they are.
 # `st` and `texture` are its own macros.
 WORDS_OF_METAL = set(
@@ -62,7 +61,6 @@ NAMED = re.compile(r"\b(?:void|bool|u?int|float|[biu]?vec[234]|mat[234]|Column)\
 
 
 def code(program) -> str:
-    """The source of a pass without its comments."""
     return re.sub(r"//.*", "", program.body)
 
 
@@ -104,3 +102,47 @@ def test_no_name_is_a_word_of_metal():
         assert named, told(program)
         assert not named & WORDS_OF_METAL, told(program)
         assert not MISSING.findall(code(program)), told(program)
+
+
+# Of what is declared inside the sources, whatever it is: variables, parameters, functions.
+DECLARED = re.compile(r"\b(?:bool|u?int|float|[biu]?vec[234])\s+(\w+)")
+
+
+def bound(program) -> set[str]:
+    return {*program.constants, *program.samplers, *program.images, *program.blocks}
+
+
+def test_constants_and_textures_share_no_name_with_a_variable():
+    """On Vulkan they are macros."""
+    for program in PASSES:
+        declared = set(DECLARED.findall(program.body))
+        assert declared, told(program)
+        assert not declared & bound(program), told(program)
+
+
+def test_all_that_is_declared_is_read():
+    """Blender declares it itself, and refuses constants that a source does not use."""
+    for program in PASSES:
+        assert not re.findall(r"(?m)^(?:layout|uniform|in |out ).*|^#(?!\s*define ).*", program.body), told(program)
+        for name in bound(program):
+            assert re.search(rf"\b{name}\b", re.sub("//.*", "", program.body)), (told(program), name)
+
+
+def test_every_step_of_every_source_has_its_pass():
+    for path in SHADERS.glob("*.glsl"):
+        named = set(re.findall(r"(?:#ifn?def |defined\()(\w+)", path.read_text(encoding="utf-8")))
+        passes = [program for program in PASSES if program.file == path.stem]
+        assert passes or path.stem in ("blender_gpu", "show")
+        assert not passes or named <= {name for program in passes for name in (program.step, *program.defines)}
+
+
+def test_lines_are_numbered_as_in_the_files():
+    files = [
+        re.sub(r"(?m)  //.*$", "", path.read_text(encoding="utf-8")).splitlines() for path in SHADERS.rglob("*.glsl")
+    ]
+    for program in PASSES:
+        _, *parts = re.split(r"(?m)^#line (\d+)$\n?", re.sub(r"(?m)  //.*$", "", program.source))
+        for first, text in zip(parts[::2], parts[1::2], strict=True):
+            for number, line in enumerate(text.splitlines(), int(first)):
+                if line and "binding = " not in line:
+                    assert any(line in file[number - 1 : number] for file in files), (told(program), number, line)

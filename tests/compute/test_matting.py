@@ -13,8 +13,6 @@ from shutter_addon.core.model.mattes import Matte
 
 @dataclass(frozen=True)
 class Drawn:
-    """A matte's content in memory, by its number."""
-
     number: int
 
 
@@ -25,9 +23,8 @@ class Values:
         self.source, self.rng, self.known = source, np.random.default_rng(seed), {}
 
     def array(self, number, index):
-        return self.known.setdefault(
-            (number, index), self.rng.random((self.source.height, self.source.width)).astype(np.float32)
-        )
+        made = self.rng.random((self.source.height, self.source.width)).astype(np.float32)
+        return self.known.setdefault((number, index), made)
 
     def values(self, mattes, index, block):
         found = []
@@ -55,11 +52,9 @@ def mattes(rng, count, shutters=3):
 
 
 def laid(c, moment, reader, index):
-    """One matte after the other, a pixel's coefficients after another's."""
     c = c.astype(np.float64)
-    for matte, (_, values) in zip(
-        moment.mattes, reader.values(moment.mattes, index, moment.options.aggregate), strict=True
-    ):
+    known = reader.values(moment.mattes, index, moment.options.aggregate)
+    for matte, (_, values) in zip(moment.mattes, known, strict=True):
         for y, x in np.ndindex(values.shape):
             m = float(values[y, x]) * matte.opacity
             if matte.blend == "over":
@@ -83,7 +78,6 @@ def test_more_mattes_than_one_pass_lays(device):
 
 
 def test_what_changes_is_laid_anew(device):
-    """Frames, opacity, scribbles, and the number of mattes, one after the other, with one renderer."""
     rng = np.random.default_rng(46)
     source = footage(rng)
     reader, first = Values(source), replace(state(rng), mattes=mattes(rng, 2))

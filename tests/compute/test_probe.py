@@ -13,26 +13,19 @@ POINTS = [(0.001, 0.001), (0.999, 0.001), (0.31, 0.74), (0.65, 0.22), (0.5, 0.5)
 
 
 @pytest.fixture
-def request_of(blender_device):
-    def made(moment):
-        return Renderer(GPUCompositor(blender_device), footage(np.random.default_rng(3))), Request(4, moment)
-
-    return made
+def renderer(blender_device):
+    return Renderer(GPUCompositor(blender_device), footage(np.random.default_rng(3)))
 
 
 @pytest.mark.parametrize("interpolation", ["displacement", "value"])
 @pytest.mark.parametrize("aggregate", [1, 2, 4])
 @pytest.mark.parametrize("count", [2, 6])
-def test_a_point_shows_its_pixels_coefficients_and_shutter(request_of, interpolation, aggregate, count):
+def test_a_point_shows_its_pixels_coefficients_and_shutter(renderer, interpolation, aggregate, count):
     from shutter_addon.blender.interface.probe_gizmo import probed_at
 
-    rng = np.random.default_rng(count)
-    shapes = SHAPES if count > 2 else SHAPES[::2]
-    renderer, request = request_of(
-        state(rng, count=count, shapes=shapes, interpolation=interpolation, aggregate=aggregate)
-    )
+    options = {"shapes": SHAPES if count > 2 else SHAPES[::2], "interpolation": interpolation, "aggregate": aggregate}
+    request, source = Request(4, state(np.random.default_rng(count), count=count, **options)), renderer.source
     values = renderer.coefficients(request)
-    source = renderer.source
     for x, y in POINTS:
         row, column = int((1 - y) * source.height) // aggregate, int(x * source.width) // aggregate
         coefficients, bars = probed_at(renderer, request, (x, y))
@@ -41,9 +34,5 @@ def test_a_point_shows_its_pixels_coefficients_and_shutter(request_of, interpola
         between = shutters.INTERPOLATIONS[interpolation]
         assert bars == pytest.approx(between(request.state.bars, coefficients))
 
-
-@pytest.mark.parametrize("point", [(-1, -1), (1.0, 0.5), (0.5, 0.0), (0.5, 1.01)])
-def test_beside_the_picture_there_is_nothing(request_of, point):
-    from shutter_addon.blender.interface.probe_gizmo import probed_at
-
-    assert probed_at(*request_of(state(np.random.default_rng(0))), point) is None
+    for point in ((-1, -1), (1.0, 0.5), (0.5, 0.0), (0.5, 1.01)):  # beside the picture
+        assert probed_at(renderer, request, point) is None

@@ -45,11 +45,6 @@ def shots_of(dtype) -> FilmOfShots:
     return FilmOfShots(film(dtype))
 
 
-@cache
-def shots_with_between(dtype) -> FilmOfShots:
-    return FilmOfShots(with_between(dtype), STEP)
-
-
 @pytest.mark.parametrize("edges", ["hold", "mirror", "shorten", "slide"])
 @pytest.mark.parametrize(
     ("position", "direction", "dtype"), [("start", 1, np.uint8), ("center", -1, np.float32), ("end", 1, np.uint8)]
@@ -57,10 +52,8 @@ def shots_with_between(dtype) -> FilmOfShots:
 def test_a_window_shows_its_own_shot_alone(device, edges, position, direction, dtype):
     rng = np.random.default_rng(41)
     for index in (0, 6, 7, 9, 21):
-        for moment in (
-            state(rng, edges=edges, position=position),
-            few_pieces(rng, 8, edges=edges, position=position, light="encoded"),
-        ):
+        where = {"edges": edges, "position": position}
+        for moment in (state(rng, **where), few_pieces(rng, 8, light="encoded", **where)):
             check(device, shots_of(dtype), moment, index, direction, SHOTS[index])
 
 
@@ -80,10 +73,10 @@ def test_what_was_shown_before_leaves_no_trace(device):
     index = 4
     for _ in range(40):
         index = int(np.clip(index + rng.choice([1, 1, 1, -1, -2, 6, -9]), 0, 21))
-        edges, position = rng.choice(["hold", "mirror", "shorten", "slide"]), rng.choice(["start", "center", "end"])
-        options = {"light": rng.choice(["linear", "encoded"]), "stop_at_cuts": bool(rng.random() < 0.8)}
-        options |= {"edge_aware": float(rng.choice([0, 0, 0.3, 1])), "aggregate": int(rng.choice([1, 1, 2]))}
-        moment = few_pieces(rng, edges=edges, position=position, **options)
+        options = {"edges": ["hold", "mirror", "shorten", "slide"], "position": ["start", "center", "end"]}
+        options |= {"light": ["linear", "encoded"], "stop_at_cuts": [True] * 4 + [False]}
+        options |= {"edge_aware": [0.0, 0.0, 0.3, 1.0], "aggregate": [1, 1, 2]}
+        moment = few_pieces(rng, **{name: rng.choice(values).item() for name, values in options.items()})
         moment.bars[:, rng.integers(4, 16) :] = 0
         asked = Request(index, moment, 1 if rng.random() > 0.3 else -1)
         fresh = Renderer(device, ShotSource(film(size=(17, 9))))
@@ -93,7 +86,6 @@ def test_what_was_shown_before_leaves_no_trace(device):
 
 
 def test_within_a_shot_every_frame_is_decoded_once(device):
-    """And a still frame needs no other."""
     rng, source = np.random.default_rng(45), film()
     source.frames = np.stack([np.roll(source.frames[0], k, axis=1) for k in range(22)])
     renderer, moment = Renderer(device, ShotSource(source)), few_pieces(rng, 6)
@@ -122,7 +114,6 @@ BETWEEN = [0, 27, 51, 85]  # the middle one of a cut's pair of filmed frames, as
 
 
 def with_between(dtype=np.uint8) -> Footage:
-    """The film with random moments between its frames."""
     filmed = film(dtype).frames
     rng = np.random.default_rng(48)
     noise = rng.random((len(filmed) * STEP - STEP + 1, *filmed.shape[1:]))
@@ -135,11 +126,11 @@ def with_between(dtype=np.uint8) -> Footage:
 @pytest.mark.parametrize("edges", ["hold", "mirror", "shorten", "slide"])
 @pytest.mark.parametrize(("position", "dtype"), [("start", np.uint8), ("center", np.float32), ("end", np.uint8)])
 def test_moments_are_of_the_shot_of_the_nearer_filmed_frame(device, edges, position, dtype):
-    rng = np.random.default_rng(49)
+    rng, source = np.random.default_rng(49), FilmOfShots(with_between(dtype), STEP)
     for first, stop in pairwise(BETWEEN):
         for index, direction in ((first + 9, -1), (stop - 1, 1)):
             moment = state(rng, edges=edges, position=position)
-            check(device, shots_with_between(dtype), moment, index, direction, range(first, stop))
+            check(device, source, moment, index, direction, range(first, stop))
 
 
 def test_cuts_are_looked_for_in_filmed_frames_alone():
@@ -153,16 +144,16 @@ def test_cuts_are_looked_for_in_filmed_frames_alone():
     assert len(source.reads) == len(set(source.reads))
 
 
-@pytest.mark.parametrize(
-    ("edges", "position", "edge_aware"),
-    [
-        ("hold", "center", 0),
-        ("mirror", "start", 1),
-        ("shorten", "center", 1),
-        ("slide", "center", 0),
-        ("hold", "end", 1),
-    ],
+READ = (
+    ("hold", "center", 0),
+    ("mirror", "start", 1),
+    ("shorten", "center", 1),
+    ("slide", "center", 0),
+    ("hold", "end", 1),
 )
+
+
+@pytest.mark.parametrize(("edges", "position", "edge_aware"), READ)
 def test_what_is_missing_is_what_is_read(device, edges, position, edge_aware):
     """Once cuts are known: as prefetching has it."""
     source, rng = film(), np.random.default_rng(47)
@@ -185,7 +176,6 @@ def test_moments_show_nothing_of_the_next_shot(device, edges, brightness):
 
     def source(seed):
         found = film()
-        found.fps, found.options = None, {}
         texture = np.random.default_rng(seed).integers(0, 256, (7, 11, 3)).repeat(4, 0).repeat(4, 1)[:23, :37]
         found.frames[ENDS[1] : ENDS[2], ..., :3] = [np.roll(texture, k, axis=1) for k in range(LENGTHS[1])]
         found.frames[..., :3] = found.frames[..., :3] * brightness

@@ -24,28 +24,15 @@ def given():
     return colors.astype(np.float32), (shares / shares.sum(axis=2, keepdims=True)).astype(np.float32)
 
 
-def layers(shares) -> np.ndarray:
-    """(layer, H, W, 4) of four shutters each."""
-    padded = np.pad(shares, ((0, 0), (0, 0), (0, -SHUTTERS % 4)))
-    return np.ascontiguousarray(np.moveaxis(padded.reshape(*shares.shape[:2], -1, 4), 2, 0))
-
-
-def by_numpy(colors, shares, unit) -> np.ndarray:
-    """(H, W, 3), bottom row first, as pictures of a GPU are."""
-    y, x = np.mgrid[:HEIGHT, :WIDTH] + 0.5
-    full = np.repeat(np.repeat(shares[::-1], BLOCK, axis=0), BLOCK, axis=1)
-    return sum(full[..., [i]] * patterns.painted(colors[i], i, x / unit, y / unit) for i in range(SHUTTERS))
-
-
 def drawn(colors, shares, unit, step="COEFFICIENTS") -> np.ndarray:
-    """The picture that Blender's GPU draws."""
     import gpu
     from gpu_extras.batch import batch_for_shader
     from mathutils import Matrix
 
     from shutter_addon.blender.interface import drawing
 
-    data = layers(shares)
+    padded = np.pad(shares, ((0, 0), (0, 0), (0, -SHUTTERS % 4)))  # layers of four shutters each
+    data = np.ascontiguousarray(np.moveaxis(padded.reshape(*shares.shape[:2], -1, 4), 2, 0))
     palette = np.ones((1, 1, SHUTTERS, 4), dtype=np.float32)
     palette[..., :3] = colors
     kept = {}  # what is drawn with is not freed before
@@ -80,7 +67,10 @@ def drawn(colors, shares, unit, step="COEFFICIENTS") -> np.ndarray:
 @pytest.mark.parametrize("unit", [1.0, 1.5, 2.0])
 def test_the_reference_is_drawn(given, unit):
     colors, shares = given
-    picture, expected = drawn(colors, shares, unit), by_numpy(colors, shares, unit)
+    y, x = np.mgrid[:HEIGHT, :WIDTH] + 0.5
+    full = shares[::-1].repeat(BLOCK, axis=0).repeat(BLOCK, axis=1)  # the bottom row first, as in pictures of a GPU
+    expected = sum(full[..., [i]] * patterns.painted(colors[i], i, x / unit, y / unit) for i in range(SHUTTERS))
+    picture = drawn(colors, shares, unit)
     assert np.abs(picture[..., :3] - OPACITY * expected).max() <= LEVEL
     assert np.abs(picture[..., 3] - OPACITY).max() <= LEVEL
 

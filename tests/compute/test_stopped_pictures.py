@@ -40,10 +40,8 @@ def layered(rng, source, shapes):
     """Its mattes are solved for in every source frame, and there are holes."""
     moment = few_pieces(rng, 6, shapes=shapes[1:])
     drawn = FrameState(Options(6), np.ones((2, 6)), (dataclasses.replace(shapes[0], shutter=1),))
-    layers = Layers(
-        shutters=(1,), opacities=(0.99,), first=0, scribbles=(drawn,) * source.count, mattes=((None,),) * source.count
-    )
-    return dataclasses.replace(moment, layers=layers)
+    frames = {"first": 0, "scribbles": (drawn,) * source.count, "mattes": ((None,),) * source.count}
+    return dataclasses.replace(moment, layers=Layers(shutters=(1,), opacities=(0.99,), **frames))
 
 
 def counted(most=None):
@@ -57,18 +55,11 @@ def counted(most=None):
     return stopped, looks
 
 
-@pytest.mark.parametrize(
-    ("kind", "dtype"),
-    [
-        (plain, np.uint8),
-        (plain, np.float16),
-        (along_edges, np.uint8),
-        (followed, np.uint8),
-        (followed, np.float16),
-        (with_mattes, np.float16),
-        (layered, np.uint8),
-    ],
-)
+KINDS = [(kind, np.uint8) for kind in (plain, along_edges, followed, layered)]
+KINDS += [(kind, np.float16) for kind in (plain, followed, with_mattes)]
+
+
+@pytest.mark.parametrize(("kind", "dtype"), KINDS)
 def test_what_comes_after_is_whole(device, kind, dtype, monkeypatch):
     monkeypatch.setattr(window, "BAND_BYTES", 60_000)  # pictures take several passes
     rng = np.random.default_rng(50)

@@ -9,7 +9,6 @@ from made_recipes import key, made
 
 from shutter_addon.core.model import windows
 from shutter_addon.core.model.clip import Clip
-from shutter_addon.core.model.keyframes import Constant
 from shutter_addon.core.model.state_at import state_at, with_length
 from shutter_addon.core.pixels import compositor
 

@@ -139,22 +139,14 @@ def make_smooth(seed: int) -> Case:
     add_combining(rng, recipe, len(case.stored), mixed=True)
     direction = -1 if rng.random() < 0.4 else 1
     last = (len(case.stored) - 1) // recipe["inbetween"] * recipe["inbetween"]  # the last filmed frame
-    return replace(
-        case,
-        recipe=json.dumps(recipe, indent=1),
-        stored=case.stored[: last + 1],
-        index=min(case.index, last),
-        direction=direction,
-        mattes={},
-        again=" --smooth",
-    )
+    own = {"recipe": json.dumps(recipe, indent=1), "stored": case.stored[: last + 1], "index": min(case.index, last)}
+    return replace(case, direction=direction, mattes={}, again=" --smooth", **own)
 
 
 # Recipes
 
 
 def follows(recipe: dict) -> bool:
-    """Whether a shutter follows anything."""
     return any("follow" in shutter for shutter in recipe["shutters"])
 
 
@@ -301,24 +293,22 @@ def rounded(values):
     return np.round(values, 5).tolist()
 
 
+OPTIONS = {"position": ("start", "center", "end"), "interpolation": ("displacement", "displacement", "value")}
+OPTIONS |= {
+    "light": ("linear", "encoded"),
+    "exposure": ("normalized", "weighted"),
+    "edges": ("hold", "mirror", "shorten"),
+}
+OPTIONS |= {"aggregate": (1, 1, 2, 4), "border": (False, True), "stop_at_cuts": (False, True)}
+
+
 def random_recipe(rng, count: int) -> dict:
     window = int(choose(rng, 1, 2, 3, 4, 6, 8, 8, 11, 16, 24))
     names = ["Default", "B", "ü", "D d", "E", "F"][: choose(rng, 1, 2, 2, 3, 3, 4, 5, 6)]
     scale = choose(rng, 1, 1, 0.01, 50)
-    recipe = {
-        "version": 2,
-        "window": window,
-        "position": choose(rng, "start", "center", "end"),
-        "interpolation": choose(rng, "displacement", "displacement", "value"),
-        "light": choose(rng, "linear", "encoded"),
-        "exposure": choose(rng, "normalized", "weighted"),
-        "edges": choose(rng, "hold", "mirror", "shorten"),
-        "aggregate": choose(rng, 1, 1, 2, 4),
-        "border": choose(rng, False, True),
-        "stop_at_cuts": choose(rng, False, True),
-        "shutters": [random_shutter(rng, name, window, count, scale) for name in names],
-        "regions": [random_region(rng, names, count) for _ in range(rng.integers(0, 7))],
-    }
+    recipe = {"version": 2, "window": window} | {name: choose(rng, *each) for name, each in OPTIONS.items()}
+    recipe["shutters"] = [random_shutter(rng, name, window, count, scale) for name in names]
+    recipe["regions"] = [random_region(rng, names, count) for _ in range(rng.integers(0, 7))]
     if rng.random() < 0.4:
         recipe["time"] = random_time(rng, count)
     return recipe
@@ -340,7 +330,6 @@ def ease(rng) -> dict:
 
 
 def frames(rng, count: int, most: int) -> list[int]:
-    """Some frames of keys, in the clip and around it."""
     return sorted(rng.choice(np.arange(-3, count + 6), int(rng.integers(1, most + 1)), replace=False).tolist())
 
 

@@ -162,10 +162,8 @@ def check_mixed(case: Case, devices: dict, folder: Path) -> dict:
                 levels, own = renderer.picture(replace(asked, levels=True)).copy(), layers_of(renderer, asked)
             right = lent_picture(device, rendering, asked)
             stepped = np.abs(levels.astype(int) - CPUCompositor().over_black(right)).max(axis=-1) > 1
-            differs, doubtful = (
-                stepped | ~(light_apart(made, right).max(axis=-1) <= PICTURE),
-                np.zeros(stepped.shape, bool),
-            )
+            differs = stepped | ~(light_apart(made, right).max(axis=-1) <= PICTURE)
+            doubtful = np.zeros(stepped.shape, bool)
             for seed, other in enumerate(nudged(asked)) if differs.any() else ():
                 doubtful |= light_apart(lent_picture(device, rendering, other, seed), right).max(axis=-1) > PICTURE / 2
             doubtful &= differs & np.isfinite(made).all(axis=-1)
@@ -243,7 +241,6 @@ def nudged_light(frame, asked, source, random):
 
 
 def nudged(asked):
-    """Requests for almost the same picture."""
     for seed in range(NUDGES):
         state, way = asked.state, (-1) ** seed
         bars = state.bars * (1 + NUDGE * np.random.default_rng(seed).normal(size=state.bars.shape))
@@ -269,18 +266,11 @@ def asked_of(case: Case, source, folder: Path):
     recipe = recipe_file.parse(case.recipe)
     effect = with_contents(recipe.for_picture(source.width / source.height), partial(matte_file, folder, source))
     way = case.direction * case.index / source.step
-    timing = StripTiming(
-        name="Footage",
-        first=0,
-        scene_fps=24.0,
-        content_start=case.frame - way,
-        content_end=case.frame - way + 1,  # where it plays backward, it ends there
-        content_trim_start=0,
-        content_trim_end=0,
-        left_handle=1,
-        use_reverse_frames=case.direction < 0,
-        strobe=1.0,
-    )
+    # Where it plays backward, its content ends there.
+    content = {"content_start": case.frame - way, "content_end": case.frame - way + 1}
+    trimmed = {"content_trim_start": 0, "content_trim_end": 0, "left_handle": 1}
+    common = {"name": "Footage", "first": 0, "scene_fps": 24.0, "strobe": 1.0}
+    timing = StripTiming(use_reverse_frames=case.direction < 0, **content, **trimmed, **common)
     clip = Clip(width=source.width, height=source.height, count=source.count, step=source.step, timing=timing)
     return Request(*state_at(effect, clip, case.frame))
 
@@ -322,7 +312,6 @@ def matte_file(folder: Path, source, region):
 
 
 def exact_coefficients(case: Case, source, footage, index: int) -> np.ndarray:
-    """The reference's."""
     recipe, solve = json.loads(case.recipe), solving(case, source)
     size = source.width, source.height
     mix = coefficients(recipe, case.frame, *size, lambda labels, count: solve(labels, count, index, case.frame))
@@ -364,7 +353,6 @@ def can_be_a_film(case: Case) -> bool:
 
 
 def film(case: Case, place: Path) -> list[str]:
-    """The arguments of the command that renders the case's frame, in a new folder with its recipe and footage."""
     place.mkdir()
     # Noise may well look like a cut.
     (place / "recipe.json").write_text(json.dumps(json.loads(case.recipe) | {"stop_at_cuts": False}))
@@ -374,7 +362,6 @@ def film(case: Case, place: Path) -> list[str]:
 
 
 def render(films: list[list[str]]) -> None:
-    """Runs the command with each of these arguments, in another process."""
     command = [sys.executable, Path(__file__).with_name("films.py")]
     done = subprocess.run(command, input=json.dumps(films), capture_output=True, text=True, check=False)
     if done.returncode:
@@ -382,7 +369,6 @@ def render(films: list[list[str]]) -> None:
 
 
 def read_image(path: Path) -> dict:
-    """The channels (H, W) of an image, by name."""
     image = ImageBuf(str(path))
     return dict(zip(image.spec().channelnames, np.moveaxis(image.get_pixels(), -1, 0), strict=True))
 
@@ -453,9 +439,8 @@ def main() -> int:
     kinds.add_argument("--mixed", action="store_true", help="recipes that have every field with every other")
     kinds.add_argument("--smooth", action="store_true", help="frames that are moments, of which some were filmed")
     parser.add_argument("--ways", default="cpu,gpu", help="of cpu, gpu, blender, film (default: cpu,gpu)")
-    parser.add_argument(
-        "--output", type=Path, default=ROOT / "out" / "differential", metavar="DIR", help="for pictures"
-    )
+    output = ROOT / "out" / "differential"
+    parser.add_argument("--output", type=Path, default=output, metavar="DIR", help="for pictures")
     arguments = parser.parse_args()
     ways = arguments.ways.split(",")
     devices, failed = open_devices([way for way in ways if way != "film"]), False

@@ -52,17 +52,8 @@ Footage = namedtuple("Footage", "samples transfer alpha levels", defaults=[None]
 # doubtful: (H, W) bool, where float32 cannot tell whether anything is left of a shutter, or which frame is the nearest.
 Result = namedtuple("Result", "picture doubtful")
 
-DEFAULTS = {
-    "position": "start",
-    "interpolation": "displacement",
-    "light": "linear",
-    "exposure": "normalized",
-    "edges": "hold",
-    "aggregate": 1,
-    "border": False,
-    "plate_reach": 48,
-    "inbetween": 1,
-}
+DEFAULTS = {"position": "start", "interpolation": "displacement", "light": "linear", "exposure": "normalized"}
+DEFAULTS |= {"edges": "hold", "aggregate": 1, "border": False, "plate_reach": 48, "inbetween": 1}
 LEAST_RADIUS = 0.7072
 NOTHING = 1e-6  # less of an exposure than this is nothing
 EARLIER = 1e-3  # by so much of a frame an earlier one is preferred
@@ -157,7 +148,8 @@ def drawn_at(region, frame, aspect):
     keys = region.get("keys", [])
     drawings = [key for key in keys if "strokes" in key]
     if not keys or "strokes" not in keys[0]:
-        drawings.insert(0, {"frame": keys[0]["frame"] if keys else 0, **region, **(_ease(keys))})
+        first = keys[0] if keys else {"frame": 0}
+        drawings.insert(0, {"frame": first["frame"], **region, "ease": first.get("ease", "linear")})
     a, b, u = between(drawings, frame)
     strokes = [as_complex(stroke, aspect) for stroke in a["strokes"]]
     if u > 0:
@@ -175,14 +167,8 @@ def middle(strokes):
 def placement(keys, frame):
     """Location x and y, rotation and scale at a frame."""
     a, b, u = between(keys, frame)
-    first, second = (
-        np.array([*key.get("location", (0, 0)), key.get("rotation", 0), key.get("scale", 1)], float) for key in (a, b)
-    )
-    return (1 - u) * first + u * second
-
-
-def _ease(keys):
-    return {"ease": keys[0].get("ease", "linear")} if keys else {}
+    ways = [[*key.get("location", (0, 0)), key.get("rotation", 0), key.get("scale", 1)] for key in (a, b)]
+    return np.array([1 - u, u]) @ np.array(ways, float)
 
 
 def as_complex(points, aspect):
@@ -488,10 +474,8 @@ def motion(tells, frame, time, aspect):
     (c0, p0), (c1, p1) = (tells(low + k, aspect) for k in (0, 1))
     share = time - low
     start, end = tells(frame, aspect), ((1 - share) * c0 + share * c1, (1 - share) * p0 + share * p1)
-    (z0, turn0), (z1, turn1) = (
-        (centre + x * aspect + 1j * y, scale * np.exp(1j * np.radians(rotation)))
-        for centre, (x, y, rotation, scale) in (start, end)
-    )
+    z0, z1 = (centre + x * aspect + 1j * y for centre, (x, y, _, _) in (start, end))
+    turn0, turn1 = (scale * np.exp(1j * np.radians(rotation)) for _, (_, _, rotation, scale) in (start, end))
     return turn1 / turn0, z1 - turn1 / turn0 * z0
 
 
@@ -523,9 +507,8 @@ def trailed(recipe, shutter, bars, frame, turns, shifts, shown_time, aspect):
         corners = np.array([0, aspect, 1j, aspect + 1j])
     else:
         points = np.concatenate(strokes_at(region, frame, aspect))
-        corners = np.array(
-            [x + 1j * y for x in (points.real.min(), points.real.max()) for y in (points.imag.min(), points.imag.max())]
-        )
+        sides, heights = ([part.min(), part.max()] for part in (points.real, points.imag))
+        corners = np.array([x + 1j * y for x in sides for y in heights])
     places = turns[:, None] * corners + shifts[:, None]
     steps = [max(abs(b - a)) for a, b in pairwise(places)] or [0.0]
     own = [(a + b) / 2 for a, b in pairwise([steps[0], *steps, steps[-1]])][: len(bars)]
@@ -955,12 +938,8 @@ def stretched(bars, first, last, start, end):
     """Bars (L,) that were open from `first` to `last`, open from start to end."""
     scale = (end - start) / (last - first)
     spans = list(pairwise(start + (j - first) * scale for j in range(len(bars) + 1)))
-    return np.array(
-        [
-            sum(bar * overlap(*own, k, k + 1) for bar, own in zip(bars, spans, strict=True)) / scale
-            for k in range(len(bars))
-        ]
-    )
+    parts = [[bar * overlap(*own, k, k + 1) for bar, own in zip(bars, spans, strict=True)] for k in range(len(bars))]
+    return np.array([sum(part) for part in parts]) / scale
 
 
 # What shutters that combine alike compose with. mix: coefficients (N, n) of the blocks, Σ = 1; bars (N, L); reference:
@@ -1069,11 +1048,8 @@ def extreme(way, seen, light):
     best = np.where(there.any(axis=0), best, 0)
     if threshold is not None and any(whole is not None for *_, whole in seen):
         counted = np.ones_like(counted)
-    return (
-        np.concatenate([best if mode == "lightest" else cover[..., None] - best, cover[..., None]], -1),
-        doubtful,
-        counted,
-    )
+    colour = best if mode == "lightest" else cover[..., None] - best
+    return np.concatenate([colour, cover[..., None]], axis=-1), doubtful, counted
 
 
 def median(_way, seen, _light):

@@ -24,7 +24,7 @@ FAULTS = {
     "lassos left empty": (
         scribbles,
         "rasterise",
-        lambda shapes, *size, border: rasterise(outlines(shapes), *size, border=border),
+        lambda shapes, *size, **how: rasterise(outlines(shapes), *size, **how),
     ),
     "no displacement": (shutters, "displace", shutters.mix),
     "another curve": (light, "to_linear", lambda code: np.sign(code) * np.abs(code) ** 2.2),
@@ -40,11 +40,7 @@ FAULTS = {
     "mattes in another order": (mattes, "blended", lambda c, shown, values: blended(c, shown[::-1], values[::-1])),
     "hard mattes": (matte_values, "feathered", lambda values, width: values),
     "outlines of hard edges": (mattes, "coverage", lambda *given: np.round(coverage(*given))),
-    "a ramp that is not turned": (
-        mattes.Ramp,
-        "values",
-        lambda ramp, *size: ramp_values(replace(ramp, rotation=0), *size),
-    ),
+    "a straight ramp": (mattes.Ramp, "values", lambda ramp, *size: ramp_values(replace(ramp, rotation=0), *size)),
     "ghosts": (layering, "behind", lambda values: np.ones_like(values[0])),
     "what a camera pans over": (layer_frames, "uncovered", lambda colors, seen, *_: (colors, seen)),
     "the mean for the median": (compositor, "weighted_median", lambda values, weights: mean(values, weights)),
@@ -63,7 +59,6 @@ def mean(values, weights):
 
 
 def outlines(shapes):
-    """Lassos as the thinnest lines."""
     return [replace(shape, kind="line", width=0.0) if shape.kind == "lasso" else shape for shape in shapes]
 
 

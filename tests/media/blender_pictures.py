@@ -15,8 +15,8 @@ def blender(folder, jobs):
     """Renders frames of plain strips. jobs: {name: {"files": [...], "frames": [index, ...]} and, when wanted,
     "colorspace", "alpha_mode", "deinterlace", "depth": "16"}; a movie has one file and "movie": True.
 
-    Returns {name: {"count", "fps", "size": (width, height), "colorspace", "pictures": {index: array}}}; the arrays are
-    (height, width, 4), display values 0…1 with associated alpha, top row first.
+    Returns {name: {"count", "size": (width, height), "pictures": {index: array}}}; the arrays are (height, width, 4),
+    display values 0…1 with associated alpha, top row first.
     """
     folder = Path(folder)
     (folder / "jobs.json").write_text(json.dumps(jobs))
@@ -50,25 +50,15 @@ def _render(folder):
         if "alpha_mode" in job:
             strip.alpha_mode = job["alpha_mode"]
         size = strip.elements[0].orig_width, strip.elements[0].orig_height
-        scene.render.resolution_x, scene.render.resolution_y = size
-        scene.render.resolution_percentage = 100
-        scene.view_settings.view_transform = "Standard"
-        scene.render.dither_intensity = 0
-        scene.render.image_settings.file_format = "PNG"
-        scene.render.image_settings.color_mode = "RGBA"
-        scene.render.image_settings.color_depth = job.get("depth", "8")
+        render, settings = scene.render, scene.render.image_settings
+        (render.resolution_x, render.resolution_y), render.resolution_percentage = size, 100
+        scene.view_settings.view_transform, render.dither_intensity = "Standard", 0
+        settings.file_format, settings.color_mode, settings.color_depth = "PNG", "RGBA", job.get("depth", "8")
         for index in job["frames"]:
             scene.frame_set(index + 1)
             scene.render.filepath = str(folder / f"{name}_{index}.png")
             bpy.ops.render.render(write_still=True, scene=scene.name)
-        element = strip.elements[0]
-        results[name] = {
-            "count": strip.content_duration,
-            "fps": getattr(element, "orig_fps", None),
-            "size": size,
-            "colorspace": strip.colorspace_settings.name,
-            "alpha_mode": strip.alpha_mode,
-        }
+        results[name] = {"count": strip.content_duration, "size": size}
         strips.remove(strip)
     (folder / "results.json").write_text(json.dumps(results))
 

@@ -9,23 +9,19 @@ from footage import coloured_movies, deinterlaced_movies, ugly_movies
 
 @pytest.fixture(scope="session")
 def movies(tmp_path_factory):
-    """{name: (path, numbers)} of footage.ugly_movies."""
     return ugly_movies(tmp_path_factory.mktemp("movies"))
 
 
 @pytest.fixture(scope="session")
 def coloured(tmp_path_factory):
-    """{name: path} of footage.coloured_movies."""
     return dict(coloured_movies(tmp_path_factory.mktemp("coloured")))
 
 
 @pytest.fixture(scope="session")
 def deinterlaced(tmp_path_factory):
-    """{name: path} of footage.deinterlaced_movies."""
     return dict(deinterlaced_movies(tmp_path_factory.mktemp("deinterlaced")))
 
 
 @pytest.fixture(scope="session")
 def blender_config():
-    """Blender's OpenColorIO configuration."""
     return next(Path(find_spec("bpy").origin).parent.glob("*/datafiles/colormanagement/config.ocio"))

@@ -79,6 +79,21 @@ def make_movie(
     return path
 
 
+def save_parts(path, *parts):
+    """Writes an EXR of parts: each an array (height, width, channels), the channels' names and their sample types."""
+    specs = [ImageSpec(*array.shape[1::-1], len(names), kinds[0]) for array, names, kinds in parts]
+    for number, (spec, (_, names, kinds)) in enumerate(zip(specs, parts, strict=True)):
+        spec.channelnames, spec.channelformats = names, kinds
+        spec.attribute("oiio:subimagename", f"part{number}")
+    out = ImageOutput.create(str(path))
+    assert out.open(str(path), tuple(specs)), out.geterror()
+    for number, (spec, (array, *_)) in enumerate(zip(specs, parts, strict=True)):
+        assert not number or out.open(str(path), spec, "AppendSubimage"), out.geterror()
+        assert out.write_image(np.ascontiguousarray(array)), out.geterror()
+    out.close()
+    return path
+
+
 def _write_silence(out, seconds):
     if not seconds:
         return
@@ -173,20 +188,21 @@ def coloured_movies(folder):
     yield movie("bt709.mp4", "libx264", "yuv420p", options=LOSSLESS, tags=tags(1))
     yield movie("bt601.mp4", "libx264", "yuv420p", options=LOSSLESS, tags=tags(5, 1, 6, 5))
     yield movie("full_range.mp4", "libx264", "yuv420p", options=LOSSLESS, tags=tags(1, 2))
-    yield movie("jpeg_range.mp4", "libx264", "yuvj420p", options=LOSSLESS)
-    yield movie("yuv444.mp4", "libx264", "yuv444p", options=LOSSLESS)
+    for name, pix_fmt in (("jpeg_range", "yuvj420p"), ("yuv444", "yuv444p"), ("ten_bits", "yuv420p10le")):
+        yield movie(f"{name}.mp4", "libx264", pix_fmt, options=LOSSLESS)
+    for name, pix_fmt in (("rgb", "bgr0"), ("gray", "gray"), ("rgb48", "rgb48le")):
+        yield movie(f"{name}.mkv", "ffv1", pix_fmt)
     yield movie("mjpeg.avi", "mjpeg", "yuvj420p")
-    yield movie("rgb.mkv", "ffv1", "bgr0")
-    yield movie("gray.mkv", "ffv1", "gray")
     yield movie("odd.avi", "mpeg4", "yuv420p", size=(33, 17))
-    yield movie("ten_bits.mp4", "libx264", "yuv420p10le", options=LOSSLESS)
     yield movie("bt2020.mkv", "ffv1", "yuv420p10le", tags=tags(9, 1, 14, 9))
     yield movie("prores.mov", "prores_ks", "yuv422p10le")
-    yield movie("rgb48.mkv", "ffv1", "rgb48le")
-    yield movie("alpha.mov", "qtrle", "argb", **CLEAR)
-    yield movie("alpha_png.mov", "png", "rgba", **CLEAR)
+    for name, codec, pix_fmt in (
+        ("alpha", "qtrle", "argb"),
+        ("alpha_png", "png", "rgba"),
+        ("alpha_deep", "png", "rgba64be"),
+    ):
+        yield movie(f"{name}.mov", codec, pix_fmt, **CLEAR)
     yield movie("alpha.webm", "libvpx-vp9", "yuva420p", options={"lossless": "1"}, **CLEAR)
-    yield movie("alpha_deep.mov", "png", "rgba64be", **CLEAR)
     yield movie("alpha_prores.mov", "prores_ks", "yuva444p10le", options={"profile": "4444"}, **CLEAR)
     for degrees in (90, 180, 270):
         name = f"turned_{degrees}.mp4"
@@ -196,11 +212,9 @@ def coloured_movies(folder):
 
 # Codecs whose frames bear tags of their own: encoder, pixels, options, and what writes BT.709, BT.601 or nothing there.
 _PRORES = "prores_metadata=color_primaries={0}:color_trc={0}:colorspace={1}"
-TAGGED = {
-    "mov": ("prores_ks", "yuv422p10le", {}, _PRORES, ("bt709", "smpte170m", "unknown")),
-    "mkv": ("prores_ks", "yuv422p10le", {}, _PRORES, ("bt709", "smpte170m", "unknown")),
-    "webm": ("libvpx-vp9", "yuv420p", {"lossless": "1"}, "vp9_metadata=color_space={1}", ("bt709", "bt601", "unknown")),
-}
+TAGGED = dict.fromkeys(("mov", "mkv"), ("prores_ks", "yuv422p10le", {}, _PRORES, ("bt709", "smpte170m", "unknown")))
+_VP9 = {"lossless": "1"}, "vp9_metadata=color_space={1}", ("bt709", "bt601", "unknown")
+TAGGED |= {"webm": ("libvpx-vp9", "yuv420p", *_VP9)}
 # The container's matrix, and which of the names above the frames have.
 TAGS = {"both": (1, 0), "container": (1, 2), "frames": (2, 0), "neither": (2, 2), "contradicting": (1, 1)}
 
@@ -239,13 +253,10 @@ def _with_tags_in_frames(plain, path, bits):
 def deinterlaced_movies(folder):
     """Movies that Blender deinterlaces in each of its ways."""
     for name, codec, pix_fmt, more in [
-        ("fields_420.avi", "mpeg4", "yuv420p", {}),
-        ("fields_422.mkv", "ffv1", "yuv422p", {}),
+        *(("fields_420.avi", "mpeg4", "yuv420p", {}), ("fields_422.mkv", "ffv1", "yuv422p", {})),
         ("fields_444.mp4", "libx264", "yuv444p", {"options": LOSSLESS}),
-        ("blur_size.avi", "mpeg4", "yuv420p", {"size": (130, 66)}),
-        ("blur_rgb.mkv", "ffv1", "bgr0", {}),
-        ("blur_deep.mkv", "ffv1", "yuv420p10le", {}),
-        ("blur_alpha.mov", "qtrle", "argb", CLEAR),
+        *(("blur_size.avi", "mpeg4", "yuv420p", {"size": (130, 66)}), ("blur_alpha.mov", "qtrle", "argb", CLEAR)),
+        *(("blur_rgb.mkv", "ffv1", "bgr0", {}), ("blur_deep.mkv", "ffv1", "yuv420p10le", {})),
     ]:
         yield name, make_movie(folder / name, codec, 2, pix_fmt=pix_fmt, **more)
 
@@ -260,14 +271,10 @@ def ugly_movies(folder):
         files[name] = make_movie(folder / name, codec, **more), numbers
 
     encode("b_frames.mp4", "libx264", options=h264)
-    encode("open.mkv", "libx264", options=open_group)
-    encode("open.mp4", "libx264", options=open_group)
-    encode("open.ts", "libx264", options=open_group)
-    encode(
-        "hevc.mp4",
-        "libx265",
-        options={"x265-params": "open-gop=1:keyint=12:bframes=3:pools=none:frame-threads=1:log-level=none"},
-    )
+    for name in ("open.mkv", "open.mp4", "open.ts"):
+        encode(name, "libx264", options=open_group)
+    hevc = "open-gop=1:keyint=12:bframes=3:pools=none:frame-threads=1:log-level=none"
+    encode("hevc.mp4", "libx265", options={"x265-params": hevc})
     encode("fields.mkv", "libx264", options={"x264-params": "tff=1:bframes=0"})  # interlaced
     encode("refresh.mp4", "libx264", options={"x264-params": "intra-refresh=1:keyint=12:bframes=0"})
     encode("mpeg4.avi", "mpeg4", [0, *plain[:-1]], options={"bf": "2", "g": "12"})  # time stamps from 1 on, start 0

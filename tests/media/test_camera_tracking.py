@@ -40,12 +40,10 @@ def seen_from(frame, pan):
 
 
 def ways(count, pan=0.0):
-    """The true motion of the scenery since the first frame."""
     return [seen_from(n, pan).after(seen_from(0, pan).inverse()) for n in range(count)]
 
 
 def film(count, pan=0.0, subject=None):
-    """Its frames, and the true motion."""
     frames = []
     for n in range(count):
         frame = warped(scenery(), seen_from(n, pan)).astype(np.float32)
@@ -59,7 +57,6 @@ def film(count, pan=0.0, subject=None):
 
 
 def lasso(count):
-    """A region around the subject."""
     turns = np.linspace(0, 6.1, 24)
     points = MIDDLE + RADII[0] * np.cos(turns) + 1j * RADII[1] * np.sin(turns)
     shape = np.stack([points.real / WIDTH, 1 - points.imag / HEIGHT], axis=1)

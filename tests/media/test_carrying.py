@@ -5,6 +5,7 @@ import os
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
+from unittest import mock
 
 import cv2
 import footage
@@ -97,7 +98,6 @@ def _footage(tmp_path):
 
 @pytest.fixture
 def carried(footage, tmp_path):
-    """Opens what is carried from drawings at these frames."""
     return lambda *frames: CarriedFile(footage, drawings(*frames), tmp_path / "mattes").open()
 
 
@@ -111,8 +111,7 @@ def test_from_both_sides(carried):
 
 
 def test_it_ends_at_a_cut(tmp_path):
-    footage = Footage(tmp_path, 30, cut=15)
-    mattes = CarriedFile(footage, drawings(9), tmp_path / "mattes").open()
+    mattes = CarriedFile(Footage(tmp_path, 30, cut=15), drawings(9), tmp_path / "mattes").open()
     assert (mattes.read(13) * truth(13)).sum() > 0.9 * truth(13).sum()
     assert not mattes.read(15).any()
     assert not mattes.read(20).any()
@@ -129,7 +128,6 @@ def test_it_fades_where_nothing_like_it_is_seen(tmp_path):
 
 
 def around_the_edge(alpha):
-    """Within four pixels of it."""
     inside, disc = (alpha > 0.5).astype(np.uint8), cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (9, 9))
     return cv2.dilate(inside, disc) > cv2.erode(inside, disc)
 
@@ -220,8 +218,7 @@ def test_curves_around_what_is_carried(carried):
     assert mattes.curves(0) == drawings(0)[0][1]
     middle = [(curve(0) + curve(6)) / 2 / (WIDTH, -HEIGHT) + (0, 1)]
     np.testing.assert_allclose(mattes.curves(3)[0], middle[0])
-    matte = mattes.read(3)
-    found = mattes.curves(3)
+    matte, found = mattes.read(3), mattes.curves(3)
     assert sum(map(len, found)) < 150
     assert np.abs(outlines.coverage(found, WIDTH, HEIGHT) - (matte > 0.5)).mean() < 0.004
 
@@ -260,10 +257,6 @@ def test_what_stands_in(footage, tmp_path):
     assert reader.values((matte,), 40, 1)[0][1].shape == (HEIGHT, WIDTH)
 
 
-def refused(**_):
-    raise PermissionError
-
-
 def test_a_folder_that_takes_nothing(footage, tmp_path, monkeypatch):
     """Mattes are kept elsewhere then, for all who ask; those that were in it before are read there."""
     good = CarriedFile(footage, drawings(0, 4), tmp_path / "mattes").open()
@@ -274,7 +267,9 @@ def test_a_folder_that_takes_nothing(footage, tmp_path, monkeypatch):
     np.testing.assert_array_equal([file.open().read(frame) for frame in (2, 4)], expected)
     assert file.open().has(2)
     carried_mattes._writable.cache_clear()  # private: it lasts as long as the program
-    monkeypatch.setattr(tempfile, "TemporaryFile", refused)  # as where it may be read alone
+    monkeypatch.setattr(
+        tempfile, "TemporaryFile", mock.Mock(side_effect=PermissionError)
+    )  # as where it may be read alone
     assert good.has(2)
     carried_mattes._temporary.cache_clear()  # private: as before
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "file"))

@@ -51,8 +51,6 @@ class Footage:
 
 
 class Still:
-    """A subject that is not moved yet."""
-
     def placement(self, _frame):
         return Placement()
 

@@ -29,12 +29,10 @@ def frame(rgb, dtype=np.uint8, alpha=1.0):
 
 
 def pan(x, dtype=np.uint8):
-    """A view of a wide picture that moved by x pixels to the left."""
     return frame(noise(1, HEIGHT, WIDTH + 64)[:, x : x + WIDTH], dtype)
 
 
 def at(pair, number, steps):
-    """One of the moments of a pair."""
     return as_rgba(pair.moment(0, number, steps))
 
 
@@ -224,15 +222,11 @@ def test_the_same_bits_whatever_the_number_of_threads():
 
 
 def test_what_is_kept_of_pictures_of_other_sizes_is_let_go():
-    def make(width):
-        first = frame(noise(1, 32, width))
-        assert not np.array_equal(at(flow.Between(first, first + np.uint8(8)), 1, 4), first)
-
-    make(31)  # and what is kept of all pictures
-    tracemalloc.start()
     try:
-        for width in range(32, 40):
-            make(width)
+        for width in range(31, 40):
+            first = frame(noise(1, 32, width))
+            assert not np.array_equal(at(flow.Between(first, first + np.uint8(8)), 1, 4), first)
+            tracemalloc.start()  # not before the first one, which makes what is kept of all pictures
         arrays = tracemalloc.take_snapshot().filter_traces([tracemalloc.DomainFilter(True, np.lib.tracemalloc_domain)])
     finally:
         tracemalloc.stop()

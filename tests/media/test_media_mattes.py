@@ -4,8 +4,7 @@ import struct
 
 import numpy as np
 import pytest
-from footage import make_movie, save_image
-from OpenImageIO import ImageOutput, ImageSpec
+from footage import make_movie, save_image, save_parts
 
 from shutter_addon.media import MediaError, open_source
 from shutter_addon.media.image_writing import write_exr
@@ -26,7 +25,6 @@ def noise(channels=1, seed=0, size=SIZE):
 
 
 def stored(values, kind):
-    """The values as such samples, and what these stand for, in float64."""
     if kind in TOPS:
         samples = np.rint(values * TOPS[kind]).astype(kind)
         return samples, samples / TOPS[kind]
@@ -70,7 +68,6 @@ def test_a_grey_file_is_its_grey(tmp_path, suffix, kind):
 @pytest.mark.parametrize("alpha", [False, True])
 @pytest.mark.parametrize(("suffix", "kind"), KINDS)
 def test_the_channels_of_colours(tmp_path, suffix, kind, alpha):
-    """As they are stored: neither multiplied by an alpha nor divided by it."""
     samples, expected = stored(noise(3 + alpha), kind)
     path = save_image(tmp_path / f"a.{suffix}", samples, kind, **STRAIGHT)
     for i, channel in enumerate(("red", "green", "blue")):
@@ -107,24 +104,11 @@ def test_coefficients_of_shutters_that_are_called_as_colours_are(tmp_path, names
 
 def test_a_channel_of_another_part(tmp_path):
     """The first part that has it; whole numbers stand for themselves."""
-    path, values = tmp_path / "a.exr", noise(1).astype(np.float32)
-    specs = []
-    for part, (names, kind) in enumerate([(["R", "G", "B"], "half"), (["id", "m"], "float"), (["m"], "half")]):
-        spec = ImageSpec(*SIZE, len(names), kind)
-        spec.channelnames = names
-        spec.attribute("oiio:subimagename", f"part{part}")
-        if "id" in names:
-            spec.channelformats = ("uint", "float")
-        specs.append(spec)
-    out = ImageOutput.create(str(path))
-    assert out.open(str(path), tuple(specs))
-    objects = (values > 0.5).astype(np.float32)
-    out.write_image(np.zeros((HEIGHT, WIDTH, 3), np.float32))
-    out.open(str(path), specs[1], "AppendSubimage")
-    out.write_image(np.dstack([objects, values]))
-    out.open(str(path), specs[2], "AppendSubimage")
-    out.write_image(np.zeros_like(values))
-    out.close()
+    values = noise(1).astype(np.float32)
+    objects, nothing = (values > 0.5).astype(np.float32), np.zeros_like(values)
+    colours = nothing.repeat(3, 2), ["R", "G", "B"], ["half"] * 3
+    both = np.dstack([objects, values]), ["id", "m"], ["uint", "float"]
+    path = save_parts(tmp_path / "a.exr", colours, both, (nothing, ["m"], ["half"]))
     assert np.array_equal(values_of(path, "m"), values[..., 0])
     assert np.array_equal(values_of(path, "id"), objects[..., 0])
 
@@ -142,11 +126,7 @@ def test_a_cropped_exr_lies_in_its_display_window(tmp_path, at, display):
         if 0 <= row < HEIGHT and 0 <= column < WIDTH:
             expected[y, x] = values[row, column, 0]
     assert np.array_equal(values_of(path, "m"), expected)
-
-
-def test_a_larger_data_window_is_the_picture(tmp_path):
-    """As of footage, in Blender as well."""
-    values = noise(1).astype(np.float32)
+    # A larger data window is the picture, as of footage, in Blender as well.
     path = save_image(tmp_path / "a.exr", values, "float", at=(-2, -2), display=(0, 0, 20, 10), names=["m"])
     assert np.array_equal(values_of(path, "m"), values[..., 0])
 
@@ -160,35 +140,14 @@ def test_data_windows_may_differ(tmp_path):
     assert np.count_nonzero(values) <= 40
 
 
-def numbered(folder, numbers):
-    """Pictures whose values are their places among those."""
-    for place, number in enumerate(numbers):
-        save_image(folder / f"m_{number:03}.png", np.full((8, 8, 1), place, np.uint8))
-    return folder / f"m_{numbers[0]:03}.png"
-
-
 def test_frames_of_a_sequence(tmp_path):
     """A gap holds the file before; so do the first and the last one, before and behind."""
-    with MatteFile(numbered(tmp_path, [3, 4, 7, 8])).open() as matte:
+    for place, number in enumerate((3, 4, 7, 8)):
+        save_image(tmp_path / f"m_{number:03}.png", np.full((8, 8, 1), place, np.uint8))
+    with MatteFile(tmp_path / "m_003.png").open() as matte:
         assert (matte.width, matte.height, matte.count) == (8, 8, 6)
         found = [round(matte.read(index)[0, 0] * 255) for index in (-100, -1, 0, 1, 2, 3, 4, 5, 6, 100)]
         assert found == [0, 0, 0, 1, 1, 1, 2, 3, 3, 3]
-
-
-def luma(bits, full):
-    """Every code value of so many bits once, and what it stands for. The number of values is a multiple of WIDTH."""
-    codes = np.linspace(0, (1 << bits) - 1, WIDTH * HEIGHT).astype(np.uint16).reshape(HEIGHT, WIDTH)
-    scale = 1 << (bits - 8)
-    values = codes / (256 * scale - 1) if full else ((codes / scale - 16) / 219).clip(0, 1)
-    return codes, values
-
-
-def planar(codes, pix_fmt, chroma):
-    """The frame's bytes as PyAV takes them: luma, then what belongs to two chroma planes of a quarter each."""
-    kind = np.uint8 if pix_fmt.endswith("p") or pix_fmt == "gray" else np.uint16
-    if pix_fmt.startswith("gray"):
-        return codes.astype(kind)
-    return np.concatenate([codes, np.full((HEIGHT // 2, WIDTH), chroma)]).astype(kind)
 
 
 MOVIES = [  # codec, suffix, format, bits, full range, the tag (1: limited, 2: full)
@@ -206,8 +165,12 @@ MOVIES = [  # codec, suffix, format, bits, full range, the tag (1: limited, 2: f
 @pytest.mark.parametrize(("codec", "suffix", "pix_fmt", "bits", "full", "tag"), MOVIES)
 def test_the_range_of_a_movie_is_expanded(tmp_path, codec, suffix, pix_fmt, bits, full, tag, off):
     """off: by how much its chroma is, as some coders leave it."""
-    codes, expected = luma(bits, full)
-    frame = planar(codes, pix_fmt, (128 + off) << (bits - 8))
+    scale, kind = 1 << (bits - 8), np.uint8 if bits == 8 else np.uint16
+    codes = np.linspace(0, 256 * scale - 1, WIDTH * HEIGHT).astype(kind).reshape(HEIGHT, WIDTH)  # all code values
+    expected = codes / (256 * scale - 1) if full else ((codes / scale - 16) / 219).clip(0, 1)
+    # The bytes as PyAV takes them: luma, then what belongs to two chroma planes of a quarter each.
+    chroma = np.full((0 if pix_fmt.startswith("gray") else HEIGHT // 2, WIDTH), (128 + off) * scale, kind)
+    frame = np.concatenate([codes, chroma])
     tags = {"color_range": tag} if tag else {}
     options = {"qp": "0"} if codec == "libx264" else {}
     formats = {"pix_fmt": pix_fmt, "array_format": pix_fmt}
@@ -240,11 +203,9 @@ def test_the_channels_of_a_coloured_movie(tmp_path, pix_fmt, colorspace):
 
 @pytest.mark.parametrize(("codec", "pix_fmt"), [("png", "rgba"), ("png", "rgba64be"), ("qtrle", "argb")])
 def test_the_alpha_of_a_movie(tmp_path, codec, pix_fmt):
-    frames = [np.rint(noise(4, seed) * 255).astype(np.uint8) for seed in range(2)]
-    array_format, top = "rgba", 255
-    if pix_fmt == "rgba64be":
-        frames = [frame.astype(np.uint16) * 257 for frame in frames]
-        array_format, top = pix_fmt, 65535
+    array_format, kind = (pix_fmt, np.uint16) if pix_fmt == "rgba64be" else ("rgba", np.uint8)
+    top = np.iinfo(kind).max
+    frames = [np.rint(noise(4, seed) * top).astype(kind) for seed in range(2)]
     path = make_movie(tmp_path / "a.mov", codec, pictures=frames, pix_fmt=pix_fmt, array_format=array_format, size=SIZE)
     assert np.abs(values_of(path, "alpha", 1) - frames[1][..., 3] / top).max() < 1e-4
     assert np.abs(values_of(path, "red", 1) - frames[1][..., 0] / top).max() < 1e-4
@@ -266,10 +227,8 @@ def test_a_channel_of_another_name(tmp_path, movies):
 def test_a_channel_that_a_later_frame_lacks(tmp_path):
     for n, name in enumerate(["Sharp", "Soft"]):
         save_image(tmp_path / f"m_{n}.exr", noise(), "half", names=[name])
-    with (
-        MatteFile(tmp_path / "m_0.exr", "Sharp").open() as matte,
-        pytest.raises(MediaError, match=r"^m_1\.exr: has no channel Sharp, but Soft$"),
-    ):
+    lacking = pytest.raises(MediaError, match=r"^m_1\.exr: has no channel Sharp, but Soft$")
+    with MatteFile(tmp_path / "m_0.exr", "Sharp").open() as matte, lacking:
         matte.read(1)
 
 

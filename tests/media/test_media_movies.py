@@ -14,14 +14,10 @@ from footage import HEIGHT, WIDTH, cut_file, damage_frame, make_movie, number, p
 from shutter_addon.media import MediaError, PrefetchSource, open_source
 
 
-def all_frames(source):
-    return [source.read(i) for i in range(source.count)]
-
-
 def test_index_means_frame_on_screen_in_any_order(movies):
     for name, (path, numbers) in movies.items():
         with open_source(path) as source:
-            frames = all_frames(source)
+            frames = [source.read(index) for index in range(source.count)]
             shown = [number(frame) for frame in frames]
             assert shown == sorted(shown) or name in ("stamped.mkv", "set_back.mkv"), name
             assert numbers is None or shown == numbers, name

@@ -128,7 +128,6 @@ def test_errors_come_out_of_read(ahead, source):
 
 
 def test_an_error_of_a_frame_that_two_threads_read(ahead, source):
-    """It is read again for the second."""
     source.gate.clear()
     outcomes, both = [], threading.Barrier(3, timeout=10)
     waiting = [threading.Event() for _ in range(2)]

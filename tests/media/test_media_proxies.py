@@ -26,7 +26,6 @@ def footage(tmp_path_factory):
 
 
 def shown(source, indices):
-    """The numbers that frames show, whatever their size."""
     frames = [source.read(index) for index in indices]
     assert {frame.shape for frame in frames} == {(source.height, source.width, 4)}
     assert {frame.dtype for frame in frames} == {source.dtype}
@@ -57,17 +56,10 @@ def test_one_that_does_not_fit_is_not_read(footage, tmp_path):
     proxy = proxy_movie(tmp_path / "proxy.mp4")
     clear = make_movie(tmp_path / "clear.mov", "qtrle", **CLEAR)
     (tmp_path / "text.avi").write_text("no movie")
-    for path in (
-        tmp_path / "missing.avi",
-        tmp_path / "text.avi",
-        tmp_path,
-        proxy_movie(tmp_path / "short.avi", COUNT - 1),
-        proxy_movie(tmp_path / "long.avi", COUNT + 1),
-        cut_file(proxy, tmp_path / "cut.mp4", 0.5),
-        rotate_movie(proxy, tmp_path / "turned.mp4", 90),
-        clear,
-        make_movie(tmp_path / "deep.mkv", "ffv1", pix_fmt="yuv420p10le"),
-    ):
+    deep = make_movie(tmp_path / "deep.mkv", "ffv1", pix_fmt="yuv420p10le")
+    lengths = [proxy_movie(tmp_path / f"{count}.avi", count) for count in (COUNT - 1, COUNT + 1)]
+    changed = cut_file(proxy, tmp_path / "cut.mp4", 0.5), rotate_movie(proxy, tmp_path / "turned.mp4", 90)
+    for path in (tmp_path / "missing.avi", tmp_path / "text.avi", tmp_path, *lengths, *changed, clear, deep):
         with with_proxy(open_source(footage, divisor=2), path) as source:
             assert not source.from_proxy, path.name
             assert shown(source, (0, 7)) == [0, 7], path.name

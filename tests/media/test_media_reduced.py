@@ -1,8 +1,8 @@
 """Smaller frames for previews, beside the means of the full ones."""
 
 import numpy as np
-import OpenImageIO
 import pytest
+from footage import save_image
 
 from shutter_addon.core.frames import light
 from shutter_addon.media import open_source
@@ -47,11 +47,8 @@ def test_ugly_movies_become_smaller(movies):
 
 @pytest.mark.parametrize(("suffix", "kind"), [("png", "uint8"), ("tif", "uint16"), ("exr", "half"), ("exr", "float")])
 def test_images_of_an_odd_size(tmp_path, suffix, kind):
-    path = tmp_path / f"picture_1.{suffix}"
     values = np.random.default_rng(3).random((31, 45, 3), dtype=np.float32)
-    image = OpenImageIO.ImageBuf(OpenImageIO.ImageSpec(45, 31, 3, kind))
-    image.set_pixels(OpenImageIO.ROI(), values)
-    assert image.write(str(path))
+    path = save_image(tmp_path / f"picture_1.{suffix}", values, kind)
     with open_source(path) as full, open_source(path, divisor=4) as small:
         assert (small.width, small.height) == (12, 8)
         expected, step = means(full.read(0), 4), 0.5 if kind.startswith("u") else 1e-3

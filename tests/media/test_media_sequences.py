@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from footage import number, picture, save_image, see_through
-from OpenImageIO import ImageOutput, ImageSpec
+from footage import number, picture, save_image, save_parts, see_through
 
 from shutter_addon.media import MediaError, open_source, sequence
 from shutter_addon.media.sequence import by_number, numbered_alike
@@ -16,7 +15,6 @@ STRAIGHT = {"oiio__UnassociatedAlpha": 1}
 
 
 def numbered(folder, names):
-    """Saves a picture per name, numbered by its place in the list."""
     for n, name in enumerate(names):
         save_image(folder / name, picture(n))
     return folder / names[0]
@@ -45,13 +43,9 @@ def test_files_are_found_by_number(tmp_path, names, numbers):
 
 
 def test_a_file_by_its_number():
-    for name, frame, wanted in [
-        ("a_09.png", 1, "a_10.png"),
-        ("s2_t3_09v.tif", 91, "s2_t3_100v.tif"),
-        ("7.jp2", 1, "8.jp2"),
-        ("x-0100.png", -1, "x-0099.png"),
-        ("two\nlines_1.png", 1, "two\nlines_2.png"),
-    ]:
+    names = [("a_09.png", 1, "a_10.png"), ("s2_t3_09v.tif", 91, "s2_t3_100v.tif"), ("7.jp2", 1, "8.jp2")]
+    names += [("x-0100.png", -1, "x-0099.png"), ("two\nlines_1.png", 1, "two\nlines_2.png")]
+    for name, frame, wanted in names:
         assert by_number(Path("folder 1", name))(frame) == Path("folder 1", wanted)
     assert by_number(Path("folder 1", "still.jp2")) is None
 
@@ -86,11 +80,9 @@ def test_gap_holds_the_file_before(tmp_path):
 @pytest.mark.parametrize("stray", ["a_0106.png", f"a_{10**59 + 7}.png"])
 def test_a_number_far_off_belongs_to_another_sequence(tmp_path, stray):
     first = numbered(tmp_path, ["a_0003.png", "a_0004.png", stray])
+    told = f"a_0003.png: the sequence ends with a_0004.png; too many numbers lie before {stray}"
     with open_source(first) as source:
-        assert source.files == [first, tmp_path / "a_0004.png"]
-        assert source.left_out == (
-            f"a_0003.png: the sequence ends with a_0004.png; too many numbers lie before {stray}"
-        )
+        assert (source.files, source.left_out) == ([first, tmp_path / "a_0004.png"], told)
     numbered(tmp_path, ["a_0003.png", "a_0004.png", "a_0105.png"])  # after the widest gap
     with open_source(first) as source:
         assert (source.files[101], source.files[102]) == (tmp_path / "a_0004.png", tmp_path / "a_0105.png")
@@ -166,17 +158,9 @@ def test_layers_with_colours_are_chosen(tmp_path, names, wanted):
 
 
 def test_parts_are_searched_for_colours(tmp_path):
-    depth, colour = (ImageSpec(8, 8, n, "half") for n in (1, 3))
-    depth.channelnames, colour.channelnames = ["Z"], ["R", "G", "B"]
-    for name, spec in (("depth", depth), ("colour", colour)):
-        spec.attribute("oiio:subimagename", name)
-    out = ImageOutput.create(str(tmp_path / "a.exr"))
-    assert out.open(str(tmp_path / "a.exr"), (depth, colour))
-    out.write_image(np.full((8, 8, 1), 9, np.float32))
-    out.open(str(tmp_path / "a.exr"), colour, "AppendSubimage")
-    out.write_image(np.full((8, 8, 3), 0.25, np.float32))
-    out.close()
-    with open_source(tmp_path / "a.exr") as source:
+    depth, colour = (np.full((8, 8, count), value, np.float32) for count, value in ((1, 9), (3, 0.25)))
+    path = save_parts(tmp_path / "a.exr", (depth, ["Z"], ["half"]), (colour, ["R", "G", "B"], ["half"] * 3))
+    with open_source(path) as source:
         assert list(source.read(0)[4, 4]) == [0.25, 0.25, 0.25, 1]
 
 

@@ -4,6 +4,7 @@ import gc
 import weakref
 from itertools import product
 from types import SimpleNamespace
+from unittest import mock
 
 import footage
 import numpy as np
@@ -11,11 +12,12 @@ import pytest
 from test_media_flow import blocks, frame, off, pan
 from test_media_steps import Film, shift
 
-from shutter_addon.core.frames.frame_source import as_rgba
+from shutter_addon.core.frames.frame_source import FrameSource, as_rgba
 from shutter_addon.core.model.shutters import MAX_WINDOW
 from shutter_addon.features.smooth import smooth
 from shutter_addon.features.smooth.smooth import SmoothSource, steps_for
-from shutter_addon.media import MediaError, PrefetchSource, opencv
+from shutter_addon.media import MediaError, PrefetchSource, open_source, opencv
+from shutter_addon.media.cuts import ShotSource
 
 SPEED = 8  # pixels from a frame to the next
 
@@ -57,16 +59,6 @@ def test_what_was_filmed_has_the_footage_s_bits(step, dtype):
     for index in (3, 0, 7, 1):
         for read in (source.read, source.decoded, SmoothSource(film, step).decoded):
             np.testing.assert_array_equal(as_rgba(read(index * step)), film.picture(index))
-
-
-def test_at_a_cut_moments_are_the_nearer_frame():
-    """The middle one is the first's, as a source that knows its shots has it."""
-    film = Panned(6, cut=3)
-    source = SmoothSource(film, 4)
-    for moment, shown in ((9, 2), (10, 2), (11, 3)):
-        np.testing.assert_array_equal(source.read(moment), film.picture(shown))
-    assert not np.array_equal(source.read(7), film.picture(2))
-    assert not np.array_equal(source.read(13), film.picture(3))
 
 
 @pytest.mark.parametrize("kind", [{}, {"cut": 4}, {"dtype": np.float16}])
@@ -136,14 +128,12 @@ def test_moments_come_with_the_frames_around_them():
 
 
 def speeding(x, count=3, size=(480, 270)):
-    """A film that moves by so many pixels from frame to frame."""
     film = Film(shift(x), size)
     film.count, (film.width, film.height) = count, size
     return film
 
 
 def test_as_many_as_are_asked_for_if_a_window_has_room():
-    """It reads no frame for that."""
     for asked, window in product((1, 2, 4, 8, 16), (1, 16, 17, 128, 129, 256)):
         found = steps_for(SimpleNamespace(count=9), asked, window)
         assert found <= asked
@@ -164,11 +154,11 @@ def test_a_window_bounds_what_is_needed(window, wanted):
 
 @pytest.mark.parametrize("fast", [0, 999])
 def test_few_pairs_tell_the_first_and_the_last_among_them(fast):
-    film, asked = speeding(0, count=1001), []
+    film = speeding(0, count=1001)
     film.matrix = lambda k: [[1, 0, -160 + 7 * (k > fast)], [0, 1, -160]]  # a single step
-    own = film.read
-    film.read = lambda index: asked.append(index) or own(index)
+    film.read = mock.Mock(side_effect=film.read)
     assert steps_for(film, "auto", 8) == 4
+    asked = [call.args[0] for call in film.read.call_args_list]
     assert len(asked) <= 2 * smooth._PAIRS  # the number is nobody else's
     assert (min(asked), max(asked)) == (0, 1000)
 
@@ -195,3 +185,22 @@ def test_without_opencv(monkeypatch):
     assert steps_for(speeding(7), 4, 8) == 4
     with pytest.raises(MediaError, match=r"^moments between frames need the Python package opencv"):
         SmoothSource(Panned(), 4)
+
+
+def test_wrappers_hand_on_all_that_a_source_has(bunny):
+    movie = open_source(bunny)
+    source = ShotSource(PrefetchSource(SmoothSource(movie, 2)), 2)
+    with source:
+        assert (source.count, source.fps) == (2 * movie.count - 1, 2 * movie.fps)
+        assert source.options == {**movie.options, "inbetween": 2}
+        for name in FrameSource.__annotations__.keys() - {"count", "fps", "options", "shots", "step"}:
+            assert getattr(source, name) == getattr(movie, name), name
+        assert source.files == [bunny]
+        assert source.has_audio
+        assert (source.step, movie.step) == (2, 1)
+        assert source.shots is source
+        assert movie.shots is None
+        source.want([6, 7])
+        with open_source(bunny) as other:  # the thread that decodes ahead has the first one
+            assert np.array_equal(source.read(6), other.read(3))
+            assert np.array_equal(source.read(7), SmoothSource(other, 2).read(7))

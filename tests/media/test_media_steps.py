@@ -64,7 +64,6 @@ def test_what_is_followed_stands_still_and_the_rest_moves():
 
 
 def test_a_turn_is_followed():
-    """About the picture's corner, where points are 0."""
     angle = 0.01
 
     def turned(k):
@@ -77,18 +76,14 @@ def test_a_turn_is_followed():
     assert smooth.step(found, *ways) * 540 < 0.5
 
 
-def test_nothing_is_told_across_a_cut():
+def test_nothing_is_told_across_a_cut_nor_by_few_pixels():
     rng = np.random.default_rng(1)
     film = Film(shift(0))
     first, second = film.read(0), np.flip(film.read(0), (0, 1)).copy()
     second[..., :3] = rng.integers(0, 256, second[..., :3].shape, dtype=np.uint8)
     film.read = lambda index: (first, second)[index]
     assert smooth.moved(film, 0) is None
-
-
-def test_a_picture_of_few_pixels_tells_nothing():
-    film = Film(shift(1), size=(20, 8))
-    assert smooth.moved(film, 0) is None
+    assert smooth.moved(Film(shift(1), size=(20, 8)), 0) is None
 
 
 @pytest.mark.parametrize(("height", "most"), [(90, 2), (720, 2), (1080, 3), (2160, 6)])

@@ -31,8 +31,6 @@ def test_a_readout_is_found(share):
 
 
 def test_of_a_camera_that_shakes():
-    """As a hand does: several times a second."""
-
     def shaken(t):
         return 9 * np.sin(1.1 * t) + 12 * np.sin(0.37 * t + 1) + 5 * np.sin(1.9 * t + 2)
 
@@ -40,28 +38,23 @@ def test_of_a_camera_that_shakes():
 
 
 def test_of_things_that_pass_each_at_its_own_speed():
-    """Two scenes, one above the other, whose speeds differ."""
     upper, lower = (list(pictures(0.3, lambda t, s=s: s * np.sin(t / 3))) for s in (30, -18))
     both = [np.where(np.arange(HEIGHT)[:, None] < HEIGHT / 2, a, b) for a, b in zip(upper, lower, strict=True)]
     assert readout.of_pictures(both) == pytest.approx(0.3, rel=0.1)
 
 
-@pytest.mark.parametrize(
-    ("made", "why"),
-    [
+def test_it_says_why_it_cannot():
+    for made, why in (
         ({"poles": (), "noise": 1}, readout.TOO_FEW_LINES),
         ({"motion": lambda t: 0 * t, "noise": 1}, readout.TOO_LITTLE_MOTION),
         ({"motion": lambda t: 2.0 * t}, readout.TOO_LITTLE_MOTION),
         ({"count": 5}, readout.TOO_FEW_FRAMES),
-    ],
-)
-def test_it_says_why_it_cannot(made, why):
-    with pytest.raises(readout.ReadoutError, match=why):
-        readout.of_pictures(list(pictures(0.4, **made)))
+    ):
+        with pytest.raises(readout.ReadoutError, match=why):
+            readout.of_pictures(list(pictures(0.4, **made)))
 
 
 def test_lines_that_turn_by_themselves_are_no_readout():
-    """Each as it likes, whatever its speed."""
     frames = []
     for t in range(COUNT):
         poles = [(x, wide, 0.1 * np.sin(0.9 * t + k)) for k, (x, wide, _lean) in enumerate(POLES)]

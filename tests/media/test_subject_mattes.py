@@ -21,7 +21,6 @@ GROUND = cv2.resize(np.random.default_rng(1).integers(90, 130, (12, 40, 3), np.u
 
 
 def figures(frame):
-    """The masks (H, W) of two figures side by side: a round one with a head, and a box."""
     one, other = np.zeros((2, HEIGHT, WIDTH), np.uint8)
     cv2.ellipse(one, (70 + 3 * frame, 95), (22, 40), 0, 0, 360, 1, -1)
     cv2.circle(one, (70 + 3 * frame, 45), 14, 1, -1)
@@ -36,10 +35,6 @@ def picture(frame, noise=0, seed=0):
     shown = cv2.GaussianBlur(shown, (0, 0), 0.8).astype(np.float64)
     shown += noise * np.random.default_rng(seed).standard_normal(shown.shape)
     return np.rint(np.clip(shown, 0, 255)).astype(np.uint8)
-
-
-def film(folder, count=COUNT, shows=picture, **what):
-    return Footage(folder, count, shows=shows, **what)
 
 
 def stroke(x, top, bottom):
@@ -61,7 +56,7 @@ def iou(matte, mask):
 @pytest.fixture
 def opened(tmp_path):
     def made(strokes, nots=None, drawings=(), **what):
-        footage = film(tmp_path, **what)
+        footage = Footage(tmp_path, **{"count": COUNT, "shows": picture} | what)
         return CarriedFile(footage, drawings, tmp_path / "mattes", MarkedSubject(strokes, nots or {})).open()
 
     return made
@@ -119,7 +114,6 @@ def test_it_ends_at_a_cut(opened):
 
 
 def test_it_is_quiet_where_nothing_moves(opened):
-    """Noise alone changes the pictures: mean levels from frame to frame beside the subject's edge and in it."""
     mattes = opened({0: [on_first(0)]}, shows=lambda frame: picture(0, noise=6, seed=frame))
     shown = [255 * mattes.read(frame) for frame in range(1, 4)]
     around = cv2.dilate(figures(0)[0].astype(np.uint8), np.ones((9, 9))) > 0
@@ -134,5 +128,7 @@ def test_models_that_cannot_be_used(tmp_path):
         with pytest.raises(MediaError, match=f"{path.name}: is damaged, or no ONNX model that OpenCV can run"):
             Network(path)
     with pytest.raises(MediaError, match=r"^missing\.onnx: cannot be read \(No such file or directory\)$"):
-        CarriedFile(film(tmp_path), (), subject=MarkedSubject({}, {}), model=tmp_path / "missing.onnx").open()
+        CarriedFile(
+            Footage(tmp_path, COUNT, shows=picture), (), subject=MarkedSubject({}, {}), model=tmp_path / "missing.onnx"
+        ).open()
     assert subject_mattes.MODEL == MODEL

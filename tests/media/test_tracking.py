@@ -21,7 +21,7 @@ SIZE = WIDTH, HEIGHT = 480, 270
 PIXEL = WIDTH / 640  # errors are in pixels of 640
 MIDDLE = 210 + 135j
 RADII = 55, 45  # of the subject, an ellipse
-EVERY = {"line": [[0.40, 0.46], [0.44, 0.54], [0.48, 0.46]], "lasso": None}
+LINE = [[0.40, 0.46], [0.44, 0.54], [0.48, 0.46]]
 
 
 def still(name, index):
@@ -40,8 +40,6 @@ def subject():
 
 
 class Film(footage.Film):
-    """Frames (n, H, W, 3) of arrays."""
-
     def __init__(self, frames):
         self.frames = frames
         super().__init__(self.frame, len(frames))
@@ -98,7 +96,7 @@ def film(subject, ground, path, count, start, *, shutter=0.0, covered=()):
 
 def strokes(kind):
     if kind == "line":
-        return [np.array(EVERY["line"])]
+        return [np.array(LINE)]
     around = MIDDLE + np.array([complex(RADII[0] * np.cos(a), RADII[1] * np.sin(a)) for a in np.linspace(0, 6.1, 24)])
     return [np.stack([(around.real + 0.5) / WIDTH, 1 - (around.imag + 0.5) / HEIGHT], axis=1)]
 
@@ -110,16 +108,11 @@ def region(kind, *, drawn=None, location=(0.0, 0.0)):
 
 
 def followed(source, kind, start, frames=None, **options):
-    """What was tracked, by frame, and the faults, by frame."""
-    footage = Footage(source, lambda frame: frame)
-    given = region(kind) if "region" not in options else options.pop("region")
-    tracked, faults = {}, {}
-    for found in tracking.RegionTrack(given).follow(footage, start, frames or range(source.count), **options):
-        if found.fault:
-            faults[found.frame] = found.fault
-        else:
-            tracked[found.frame] = found
-    return tracked, faults
+    track = tracking.RegionTrack(options.pop("region", None) or region(kind))
+    found = list(track.follow(Footage(source, lambda frame: frame), start, frames or range(source.count), **options))
+    return {each.frame: each for each in found if not each.fault}, {
+        each.frame: each.fault for each in found if each.fault
+    }
 
 
 def pixels(shape):
@@ -252,7 +245,6 @@ def test_a_jump_onto_a_lookalike_is_told(ground):
 
 
 def test_a_subject_that_bends_is_not_lost(ground):
-    """It soon looks unlike the frame in which it was drawn."""
     source = figures(ground, [lambda n: 4.0 * n - 80], bends=3.0)
     tracked, faults = followed(source, "line", 0, region=region("line", drawn=UPRIGHT, location=(-80 / WIDTH, 0.0)))
     assert not faults
@@ -271,7 +263,7 @@ def test_where_a_subject_is_lost():
         assert part_tracking.lost(np.arange(10, 30), np.array(sure)) == expected
 
 
-@pytest.mark.parametrize("kind", EVERY)
+@pytest.mark.parametrize("kind", ["line", "lasso"])
 def test_a_pattern_that_repeats_itself_is_never_sure(ground, kind):
     """Shaded checks that go by so quickly that the next period is nearer than their own place."""
     y, x = np.mgrid[:HEIGHT, :WIDTH]
@@ -312,11 +304,10 @@ def test_between_two_keys_both_count(subject, ground):
 def test_the_order_of_reading_and_threads_change_no_bit(subject, ground, tmp_path):
     source, _ = film(subject, ground, shake, 10, 6)
     first = followed(source, "lasso", 6)
-    threads = cv2.getNumThreads()
+    threads, footage = cv2.getNumThreads(), Footage(source, lambda frame: frame)
     try:
         cv2.setNumThreads(1)
         cv2.setRNGSeed(5)
-        footage = Footage(source, lambda frame: frame)
         for frame in (9, 3, 8, 0):
             footage.picture(frame)
         again = list(tracking.RegionTrack(region("lasso")).follow(footage, 6, range(10)))
@@ -341,8 +332,6 @@ def test_deep_and_linear_pictures_look_alike(subject):
 
 
 class CutOut(Film):
-    """Frames (n, H, W, 4) with a straight alpha."""
-
     alpha = "straight"
 
     def frame(self, index):

@@ -1,33 +1,21 @@
 """Bars painted between two keys, and the extension disabled while all of it is on the screen: a part of story.py, the
 first one, as it compares with what Blender has without the extension."""
 
-import os
-
 import addon_utils
 import bpy
 import driver
 import numpy as np
+import story
 import traces
-from driver import NAME, area_of, click, drag, edit, enable, key, move, override, part, pen_left, screen, shot
-
-FOOTAGE = os.environ["SHUTTER_FOOTAGE"]
-
-
-def effect_now():
-    return edit().virtual_shutter.effects[0]
+from driver import NAME, click, drag, edit, enable, key, move, override, part, pen_left, screen, shot
 
 
 def bars():
-    return part("blender.editing.bar_edits").bars_now(effect_now(), 0)
-
-
-def preview():
-    return driver.region_of(area_of("SEQUENCE_EDITOR", "PREVIEW"), "PREVIEW")
+    return part("blender.editing.bar_edits").bars_now(story.effect(), 0)
 
 
 def paint(bar, weight):
-    """Drags a bar of the bar editor to a weight."""
-    region = preview()
+    region = story.preview()
     editor = part("blender.interface.bar_editor")
     place = editor.layout(region.width, bars(), bpy.context.preferences.system.ui_scale)
     left, bottom, right, top = place.box
@@ -39,7 +27,7 @@ def paint(bar, weight):
 
 def painted_between_keys():
     """The other bars stay as they were shown; an undo brings all of them back."""
-    editing, effect = part("blender.editing.bar_edits"), effect_now()
+    editing, effect = part("blender.editing.bar_edits"), story.effect()
     effect.active_shutter = 0
     for frame, shown in ((1, np.eye(8)[0]), (9, np.eye(8)[7])):
         edit().frame_set(frame)
@@ -62,18 +50,18 @@ def a_drawn_region_is_one_step():
     with override("PREVIEW"):
         assert bpy.ops.shutter.draw("INVOKE_DEFAULT", True) == {"FINISHED"}
     yield 0.5
-    assert len(effect_now().regions) == len(effect_now().scene.annotation.layers) == 1
+    assert len(story.effect().regions) == len(story.effect().scene.annotation.layers) == 1
     pen_left()
-    move(preview(), 200, 200)
+    move(story.preview(), 200, 200)
     yield
     key("ctrl+z")
     yield 1.0
-    assert len(effect_now().regions) == len(effect_now().scene.annotation.layers) == 0
+    assert len(story.effect().regions) == len(story.effect().scene.annotation.layers) == 0
 
 
 def probe_follows_the_pointer():
     """The probe shows the pixel under the pointer, keeps it while the pointer is elsewhere, and takes no click."""
-    region = preview()
+    region = story.preview()
     live = bpy.context.window_manager.virtual_shutter
     before, live.probe = pixels("no probe"), True
     for x, y in ((region.width // 2, region.height * 2 // 5), (region.width * 3 // 5, region.height * 3 // 5)):
@@ -99,14 +87,13 @@ def probe_follows_the_pointer():
 def on_picture(region, x, y):
     """A point of the preview's region in fractions of the picture, which is not scaled; and how large a pixel of the
     region is there, as Blender rounds to one."""
-    render, to_view = effect_now().scene.render, region.view2d.region_to_view
+    render, to_view = story.effect().scene.render, region.view2d.region_to_view
     size = render.resolution_x, render.resolution_y
     at = np.array(to_view(x, y))
     return at / size + 0.5, (np.array(to_view(x + 1, y + 1)) - at) / size
 
 
 def pixels(name):
-    """What the screen shows, top row first."""
     image = bpy.data.images.load(str(shot(name)))
     found = np.array(image.pixels[:]).reshape(image.size[1], image.size[0], -1)[::-1]
     bpy.data.images.remove(image)
@@ -118,10 +105,10 @@ def disabled(before):
     addon_utils.disable(NAME)
     yield 1.0
     assert not traces.difference(before, traces.traces()), traces.difference(before, traces.traces())
-    move(preview(), 60, 60)
+    move(story.preview(), 60, 60)
     yield
     key("i")
-    yield from drag(preview(), [(60, 60), (70, 90)])
+    yield from drag(story.preview(), [(60, 60), (70, 90)])
     assert not (held := traces.forget()), held
 
 
@@ -149,7 +136,7 @@ def steps():
     yield 0.5
     yield from calls_wait()
     editor = edit().sequence_editor_create()
-    editor.active_strip = editor.strips.new_movie("Bunny", FOOTAGE, 1, 1)
+    editor.active_strip = editor.strips.new_movie("Bunny", story.FOOTAGE, 1, 1)
     with override("SEQUENCER"):
         assert bpy.ops.shutter.add_effect("INVOKE_DEFAULT") == {"FINISHED"}
     yield from disabled(before)  # at once: the tab of the sidebar is still to be chosen
@@ -163,7 +150,7 @@ def steps():
     shot("disabled")
     enable()
     yield 1.0
-    assert len(effect_now().shutters) == 2, "the file keeps the effect"
+    assert len(story.effect().shutters) == 2, "the file keeps the effect"
     yield from paint(2, 0.5)
     assert abs(bars()[2] - 0.5) < 0.05, bars()
     shot("enabled again")

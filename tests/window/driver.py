@@ -27,7 +27,7 @@ PREVIEWS = f"{NAME}.shutter_addon.blender.rendering.previews"
 OUT = Path(os.environ.get("SHUTTER_PICTURES", "/tmp/shutter-window"))
 _QUICK = "-define", "png:compression-level=1"  # a third of the time, for a tenth more bytes
 STEP = 0.25  # seconds that Blender gets for events and redraws
-_seen = []
+noted = []  # facts for the report
 _texts = 0  # characters of the last text in the status bar
 
 
@@ -49,7 +49,6 @@ def edit():
 
 
 def enable():
-    """Enables the extension, linked into the user folder that the caller made."""
     import addon_utils
 
     module = addon_utils.enable(NAME, default_set=True)
@@ -75,7 +74,6 @@ def video_editing_opened():
 
 
 def composing(previews):
-    """Whether a first or a better picture is being made."""
     return previews.looking.slices.last is not None or previews.smooth_previews.is_busy()
 
 
@@ -110,14 +108,16 @@ def play(story, seconds=STEP):
 
 
 def quit_blender():
-    """Ends the story as a person does, and not by leaving the process."""
+    """Ends the story as a person does, and not by leaving the process; generator: yield from it."""
     _tell("")
     bpy.ops.wm.quit_blender()
+    yield 30
+    raise AssertionError("Blender did not quit")
 
 
 def _tell(fault):
     sys.stdout.flush()
-    (OUT / "result.json").write_text(json.dumps({"fault": fault, "seen": _seen}, indent=1))
+    (OUT / "result.json").write_text(json.dumps({"fault": fault, "seen": noted}, indent=1))
 
 
 def _finish(fault):
@@ -129,17 +129,10 @@ def _finish(fault):
 
 
 def saw(**facts):
-    """Notes facts for the report."""
-    _seen.append(facts)
-
-
-def seen_so_far():
-    """The facts noted until now."""
-    return list(_seen)
+    noted.append(facts)
 
 
 def shot(name):
-    """A picture of the screen."""
     path = OUT / f"{name}.png"
     subprocess.run(["import", "-window", "root", *_QUICK, str(path)], check=True)
     return path
@@ -164,7 +157,6 @@ def _tell_status():
 
 
 def _status_bar():
-    """The pixels of its left end."""
     height = windows()[0].height
     box = f"300x16+0+{height - 18}"
     return subprocess.run(["import", "-window", "root", "-crop", box, "rgb:-"], check=True, capture_output=True).stdout
@@ -210,7 +202,6 @@ def move(region, x, y):
 
 
 def edge_moved(area, right: int, up: int):
-    """Moves an area's right or upper edge by pixels."""
     window = windows()[0]
     x = area.x + (area.width if right else area.width // 2)
     y = area.y + (area.height if up else area.height // 2)
@@ -254,14 +245,12 @@ def strip_added(name, first, channel=1, start=1):
 
 
 def render(path, **options):
-    """Begins to render the edit to a path below OUT, as a job of the window."""
     edit().render.filepath = f"{OUT}/{path}"
     with bpy.context.temp_override(window=windows()[0], scene=edit()):
         bpy.ops.render.render("INVOKE_DEFAULT", **options)
 
 
 def film(folder, first, last):
-    """Begins to render frames into a folder."""
     edit().frame_start, edit().frame_end = first, last
     render(f"{folder}/", animation=True)
 

@@ -1,6 +1,4 @@
-"""Renders from the window that end early: a picture that fails, in a movie and in a folder, and Esc.
-
-Run in a Blender with a window, the checkout linked as an extension."""
+"""Renders from the window that end early: a picture that fails, in a movie and in a folder, and Esc."""
 
 import bpy
 import driver
@@ -31,7 +29,6 @@ def add_effect():
 
 
 def begun(name, first, last):
-    """A movie or a folder, by its name."""
     settings = edit().render
     settings.use_file_extension = "." not in name
     if "." in name:

@@ -1,6 +1,4 @@
-"""From the zip to a finished film, in a Blender that has never seen the extension: run inside Blender, by
-test_installed.py. Zip, recipe, footage and frames come by environment; pictures and the film go to SHUTTER_PICTURES.
-"""
+"""From the zip to a finished film, in a Blender that has never seen the extension."""
 
 import os
 from functools import partial

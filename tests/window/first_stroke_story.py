@@ -1,5 +1,4 @@
-"""From an empty Video Editing file to the first tracked, rendered frame, by mouse and keyboard; every action is
-counted. Run inside Blender, by test_tracked.py."""
+"""From an empty Video Editing file to the first tracked, rendered frame, by mouse and keyboard, actions counted."""
 
 from pathlib import Path
 
@@ -30,7 +29,6 @@ def effect_strip():
 
 
 def on_preview(*points):
-    """Pixels of the preview's region, of points in fractions of the picture."""
     annotations = part("blender.data.annotations")
     size = annotations.picture_size(story.effect())
     matrix = annotations.picture_to_region(effect_strip(), size, story.preview())
@@ -47,7 +45,6 @@ def tool():
 
 
 def footage_chosen():
-    """In the browser at the left, by its path."""
     area = driver.area_of("FILE_BROWSER")
     bar = driver.region_of(area, "UI")
     driver.click(bar, bar.width * 0.8, bar.height - 28)
@@ -127,7 +124,6 @@ def drawing_begun(finds_subject=False):
 
 
 def stroke_drawn():
-    """What the preview shows before and after."""
     yield from story.seen("1_sharp")
     yield from driver.drag(story.preview(), on_preview(*STROKE))
     acted("the stroke is drawn")
@@ -165,7 +161,6 @@ def boxed():
 
 
 def plain_seen():
-    """The preview without the effect, to compare with."""
     effect_strip().mute = True
     yield from story.seen("5_plain")
     effect_strip().mute = False

@@ -1,5 +1,4 @@
-"""One look at a frame as it will be rendered, by *Full Quality*: and back by a second click, by another
-frame, by a change. Run inside Blender, by test_window.py."""
+"""One look at a frame as it will be rendered, by *Full Quality*, and back: by a click, another frame, a change."""
 
 import sys
 from functools import partial

@@ -9,7 +9,6 @@ from driver import edit, override, strip_added, video_editing_opened
 
 
 def opened():
-    """Generator: yield from it."""
     yield from video_editing_opened()
     editor = edit().sequence_editor
     editor.use_cache_raw = editor.use_cache_final = False

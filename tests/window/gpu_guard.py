@@ -13,7 +13,6 @@ _ANYWHERE = (gpu.types.Buffer, gpu.types.GPUShaderCreateInfo, gpu.types.GPUStage
 
 
 def is_current() -> bool:
-    """Whether Blender's GPU is current on this thread."""
     try:
         gpu.types.GPUTexture((1, 1))
     except RuntimeError:

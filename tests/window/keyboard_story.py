@@ -1,5 +1,4 @@
-"""An effect without a mouse, by Blender's search and numbers; the pointer lies over the preview and is not
-moved. Run inside Blender, by test_window.py."""
+"""An effect without a mouse, by Blender's search and numbers; the pointer stays over the preview."""
 
 import bpy
 import driver

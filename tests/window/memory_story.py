@@ -1,7 +1,5 @@
 """Little memory on the GPU: a film as a job of the window has what the preview holds freed, and the preview has what
-the film kept freed; with the film on moderngl's device, then on Blender's. Run inside Blender, by test_rendered.py.
-
-SHUTTER_FOOTAGE has the first of the source's frames, SHUTTER_RECIPE the effect, SHUTTER_MEGABYTES the limit."""
+the film kept freed; on moderngl's device, then on Blender's. SHUTTER_MEGABYTES is the limit."""
 
 import os
 from contextlib import suppress
@@ -28,7 +26,6 @@ def held(which):
 
 
 def shown():
-    """The preview, drawn at another frame."""
     frame = edit().frame_current % FRAMES + 1
     edit().frame_set(frame)
     area_of("SEQUENCE_EDITOR", "PREVIEW").tag_redraw()
@@ -39,7 +36,6 @@ def shown():
 
 
 def told_in_the_preview():
-    """What a preview says of a GPU that has no room for its frames."""
     preview = part("blender.interface.preview")
     said, wrapped = [], preview.drawing.wrapped
 

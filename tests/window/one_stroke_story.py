@@ -1,5 +1,4 @@
-"""One stroke is enough: drawn, tracked, mended where it is wrong, and rendered, by mouse. Run inside Blender, by
-test_tracked.py."""
+"""One stroke is enough: drawn, tracked, mended where it is wrong, and rendered, by mouse."""
 
 import bpy
 import driver
@@ -20,7 +19,6 @@ def region():
 
 
 def on_preview(x, y):
-    """Pixels of the preview's region, of a point in fractions of the picture."""
     view, render = story.preview().view2d, driver.edit().render
     return view.view_to_region((x - 0.5) * render.resolution_x, (y - 0.5) * render.resolution_y, clip=False)
 
@@ -34,12 +32,6 @@ def kinds():
         return {}
     curve = bag_of(data.action, data.action_slot).fcurves.find("virtual_shutter.effects[0].regions[0].location")
     return {int(key.co[0]): key.type for key in curve.keyframe_points}
-
-
-def roomier():
-    """A low timeline leaves room for the panel."""
-    area = driver.area_of("SEQUENCE_EDITOR", "SEQUENCER")
-    yield from driver.edge_moved(area, 0, 200 - area.height)
 
 
 def drawn():
@@ -121,7 +113,6 @@ def mended():
 
 
 def escaped():
-    """What is tracked until Esc stays."""
     driver.edit().frame_set(FRAME)
     yield 1.0
     yield from tracked()
@@ -194,7 +185,8 @@ def begun(shown=SHOWN, draw=drawn, size=(768, 576)):
     generator, as `drawn`, of what is drawn in its place; size: of the footage."""
     yield from story.opened(*size)
     driver.edit().frame_end = 100
-    yield from roomier()
+    area = driver.area_of("SEQUENCE_EDITOR", "SEQUENCER")
+    yield from driver.edge_moved(area, 0, 200 - area.height)  # a low timeline leaves room for the panel
     yield from story.movie_added()
     movie = driver.edit().sequence_editor.strips_all[0]
     movie.left_handle, movie.right_handle = shown.start, shown.stop

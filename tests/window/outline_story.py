@@ -1,5 +1,4 @@
-"""An outline: drawn around a walker at two frames, carried to those between, a layer, looked at in Mattes, rendered, by
-mouse. Run inside Blender, by test_tracked.py."""
+"""An outline, by mouse: drawn around a walker at two frames, carried to those between, a layer, looked at, rendered."""
 
 import bpy
 import driver
@@ -16,14 +15,12 @@ HALF = 20, 44
 
 
 def curve(frame):
-    """In fractions of the picture."""
     x, y = np.array(DRAWN[frame]) / (768, 576)
     angle = np.linspace(0, 2 * np.pi, 10, endpoint=False)
     return [(x + HALF[0] / 768 * np.cos(a), 1 - y + HALF[1] / 576 * np.sin(a)) for a in angle]
 
 
 def outlined():
-    """The first curve makes the region, the second one its next drawing."""
     for number, frame in enumerate(DRAWN):
         driver.edit().frame_set(frame)
         yield 0.5
@@ -78,13 +75,8 @@ def shapes():
     annotations, effect = part("blender.data.annotations"), story.effect()
     layer = annotations.layer_of(effect, region())
     width, height = annotations.picture_size(effect)
-    return {
-        drawing.frame_number: [
-            (x / width + 0.5, y / height + 0.5) for x, y in annotations.strokes_of(drawing)[0].tolist()
-        ]
-        for drawing in layer.frames
-        if drawing.strokes
-    }
+    found = {each.frame_number: annotations.strokes_of(each)[0].tolist() for each in layer.frames if each.strokes}
+    return {frame: [(x / width + 0.5, y / height + 0.5) for x, y in points] for frame, points in found.items()}
 
 
 def needed():

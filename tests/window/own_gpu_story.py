@@ -1,6 +1,5 @@
 """Films as jobs of the window on Blender's own GPU, moderngl hidden: a whole one, while a second window opens and
-closes; one that Esc ends; ten short ones; two that the window waits for; one during which the file is loaded again, and
-one more. Run inside Blender, by test_rendered.py. SHUTTER_FOOTAGE has the source, SHUTTER_RECIPE the effect."""
+closes; one that Esc ends; ten short ones; two that the window waits for; one during which the file is loaded again."""
 
 import bpy
 import driver
@@ -15,7 +14,6 @@ def written(folder):
 
 
 def held():
-    """The job's device, and what its textures take."""
     # The one that renders just now: to ask for it would make another where there is none.
     device = part("blender.rendering.sessions").OFFSCREEN._compositor.result().device
     # The budget counts the preview's as well.

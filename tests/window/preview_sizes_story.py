@@ -1,6 +1,4 @@
-"""Previews of several sizes, and what reads the sequencer's pictures after them. Run inside Blender, by test_window.py.
-
-Renders of one frame go to SHUTTER_PICTURES, whatever was shown before; what they have to be is test_window.py's."""
+"""Previews of several sizes, and what reads the sequencer's pictures after them: the same frame, whatever was shown."""
 
 import json
 import subprocess
@@ -31,15 +29,9 @@ def composed():
 def effect_added():
     with driver.override("SEQUENCER"):
         assert bpy.ops.shutter.add_effect("EXEC_DEFAULT") == {"FINISHED"}
-    line = [[0.45, 0.2], [0.5, 0.8]]
-    recipe = {
-        "version": 2,
-        "inbetween": 1,
-        "window": 8,
-        "border": True,
-        "shutters": [{"name": "Long", "bars": [1] * 8}, {"name": "Sharp", "bars": [1] + [0] * 7}],
-        "regions": [{"shutter": "Sharp", "kind": "line", "width": 0.05, "strokes": [line]}],
-    }
+    region = {"shutter": "Sharp", "kind": "line", "width": 0.05, "strokes": [[[0.45, 0.2], [0.5, 0.8]]]}
+    shutters = [{"name": "Long", "bars": [1] * 8}, {"name": "Sharp", "bars": [1] + [0] * 7}]
+    recipe = {"version": 2, "inbetween": 1, "window": 8, "border": True, "shutters": shutters, "regions": [region]}
     (driver.OUT / "recipe.json").write_text(json.dumps(recipe))
     with driver.override("SEQUENCER"):
         assert bpy.ops.shutter.recipe_import(filepath=str(driver.OUT / "recipe.json")) == {"FINISHED"}
@@ -49,7 +41,6 @@ def effect_added():
 
 
 def shown(name, **settings):
-    """The preview with these settings of its space."""
     for key, value in settings.items():
         setattr(space(), key, value)
     story.preview().tag_redraw()
@@ -174,7 +165,6 @@ def in_a_handler(name):
 
 
 def other_edit():
-    """A scene that shows the edit as a strip."""
     other = bpy.data.scenes.new("Other")
     render, own = other.render, driver.edit().render
     for name in ("resolution_x", "resolution_y", "dither_intensity", "fps"):
@@ -216,18 +206,8 @@ def in_background(frame):
     path = driver.OUT / "edit.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
     output = str(driver.OUT / "background_")
-    command = [
-        bpy.app.binary_path,
-        "--factory-startup",
-        "--addons",
-        driver.NAME,
-        "-b",
-        path,
-        "-o",
-        output,
-        "-f",
-        str(frame),
-    ]
+    command = [bpy.app.binary_path, "--factory-startup", "--addons", driver.NAME, "-b", path, "-o", output]
+    command += ["-f", str(frame)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     yield from driver.until(lambda: process.poll() is not None, "the render without a window ends", 60)
     assert process.returncode == 0

@@ -1,5 +1,4 @@
-"""A pole that a rolling shutter has skewed: Find Readout and Rolling Shutter Repair from the menu, and undo. Run inside
-Blender, by test_window.py."""
+"""A pole that a rolling shutter has skewed: Find Readout and Rolling Shutter Repair from the menu, and undo."""
 
 import bpy
 import driver

@@ -1,7 +1,7 @@
 """Run a story in a Blender with a window: the generator function `steps` of the module that SHUTTER_STORY names.
 
-SHUTTER_PACKAGES is a folder of packages that a Blender of a distribution need not have; SHUTTER_HIDDEN has the names
-of packages that this Blender shall lack.
+SHUTTER_PICTURES is the folder for pictures and facts, SHUTTER_PACKAGES one of packages that a Blender of a distribution
+need not have; SHUTTER_HIDDEN has the names of packages that this Blender shall lack.
 """
 
 import os

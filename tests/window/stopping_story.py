@@ -1,7 +1,5 @@
-"""A film renders in a window of its own, which shows the frame that was made; Esc in the middle of a picture ends it
-between two passes. Run inside Blender, by test_rendered.py.
-
-SHUTTER_RECIPE: of a picture that takes hundreds of passes; SHUTTER_HIDDEN: a package that shall be missing."""
+"""A film renders in a window of its own, which shows the frame that was made; Esc amid a picture, which takes
+hundreds of passes, ends it between two of them."""
 
 import os
 import threading
@@ -14,8 +12,6 @@ TICK = 0.01
 
 
 class Passes:
-    """Counts the passes of renders, and those of each picture."""
-
     def __init__(self):
         self.all, self.whole, self.begun = 0, [], None
         devices = [part("blender.devices.main_thread").RelayedDevice]

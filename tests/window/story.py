@@ -1,8 +1,6 @@
-"""The first minutes of an editor, in a real window, by mouse and keyboard: run inside Blender, by test_window.py.
-
-Bars between keys and the extension disabled; an effect without a mouse; then from an empty Video Editing file to a
-finished picture. After every step the effect's data and the preview's picture are
-kept; then every step is undone and redone, and both must be what they were. Pictures and facts go to SHUTTER_PICTURES.
+"""The first minutes of an editor, in a real window, by mouse and keys: bars between keys and the extension disabled;
+an effect without a mouse; then from an empty Video Editing file to a finished picture. The effect's data and the
+preview's picture are kept after every step; then each is undone and redone, and both must be what they were.
 """
 
 import os
@@ -52,21 +50,14 @@ def facts():
 
 
 def crop():
-    """Where the preview lies on the screen: left, top, width, height."""
     region = preview()
     left, bottom = driver.screen(region, 0, 0)
     return [left, bottom - region.height + 1, region.width, region.height]
 
 
-def pointer_left():
-    """Where it highlights nothing: over the preview's header."""
-    region = preview()
-    driver.move(region, region.width / 2, region.height + 12)
-
-
 def seen(name, **measures):
     """The picture as it is now, and facts, by functions; by default the edit's data."""
-    pointer_left()
+    driver.move(preview(), preview().width / 2, preview().height + 12)  # where it highlights nothing
     yield 0.8
     yield from driver.shot_when_shown(name)
     measures = measures or {"facts": facts, "frame": lambda: edit().frame_current}
@@ -102,13 +93,7 @@ def pictures_opened(pictures, frame):
 def movie_added():
     with driver.override("SEQUENCER"):
         bpy.ops.sequencer.movie_strip_add(
-            "EXEC_DEFAULT",
-            True,
-            filepath=FOOTAGE,
-            channel=1,
-            frame_start=1,
-            sound=False,
-            move_strips=False,
+            "EXEC_DEFAULT", True, filepath=FOOTAGE, channel=1, frame_start=1, sound=False, move_strips=False
         )
     yield 0.5
     assert [s.type for s in edit().sequence_editor.strips_all] == ["MOVIE"]
@@ -195,7 +180,6 @@ def keyed():
 
 
 def moved_to(frame):
-    """Scrubs by mouse to about a frame, then goes there."""
     area = driver.area_of("SEQUENCE_EDITOR", "SEQUENCER")
     window = driver.region_of(area, "WINDOW")
     x, _ = window.view2d.view_to_region(frame, 0, clip=False)
@@ -223,7 +207,7 @@ def undone_and_redone():
     """Every step, back to the movie alone and forth again; frame changes are no steps of their own."""
     names = list(STEPS)
     region = preview()
-    states = {entry["step"]: entry for entry in driver.seen_so_far() if "step" in entry}
+    states = {entry["step"]: entry for entry in driver.noted if "step" in entry}
     for direction, keys, order in (("undo", "ctrl+z", names[-2::-1]), ("redo", "ctrl+shift+z", names[1:])):
         for name in order:
             wanted = states[name]
@@ -310,19 +294,6 @@ def sequencer_animation(frame):
     yield 0.5
 
 
-def disabled_and_enabled():
-    import addon_utils
-
-    addon_utils.disable(driver.NAME, default_set=True)
-    yield 0.5
-    driver.shot("disabled")
-    assert not hasattr(bpy.types.Scene, "virtual_shutter")
-    driver.enable()
-    yield 1.0
-    assert [shutter.name for shutter in effect().shutters] == ["Long", "Sharp"]
-    driver.shot("enabled")
-
-
 def steps():
     yield from bars_and_disable.steps()
     yield from keyboard_story.steps()
@@ -335,4 +306,3 @@ def steps():
     yield from undone_and_redone()
     yield from saved_and_loaded()
     yield from in_agreement()
-    yield from disabled_and_enabled()

@@ -1,7 +1,4 @@
-"""A film renders as a job of the window while an editor goes on working: run inside Blender, by test_rendered.py.
-
-Frames of each film go to a folder of its name in SHUTTER_PICTURES; what they have to be is test_rendered.py's.
-SHUTTER_HIDDEN: a package that shall be missing."""
+"""A film renders as a job of the window while an editor goes on working. Its frames go to a folder of its name."""
 
 import json
 import random
@@ -25,7 +22,6 @@ def strip(name):
 
 
 def effect():
-    """The effect of the film."""
     return part("blender.data.strips").effect_of(edit(), strip("Shutter").scene)
 
 
@@ -33,7 +29,6 @@ def effect():
 
 
 def effect_on(name, start):
-    """An image strip, the effect on it."""
     source = strip_added(name, OUT / "frames" / "f0001.png", start=start)
     source.blend_type = "REPLACE"  # and that of the effect: what lies below does not count
     with override("SEQUENCER"):
@@ -41,7 +36,6 @@ def effect_on(name, start):
 
 
 def opened():
-    """An edit of two effects, the first of which is the film's; saved as edit.blend."""
     frames = np.random.default_rng(1).integers(0, 256, (FRAMES, *SIZE, 3), dtype=np.uint8)
     support.write_frames(OUT / "frames", frames)
     yield from video_editing_opened()
@@ -65,7 +59,6 @@ def opened():
 
 
 def again():
-    """The edit as it was saved."""
     bpy.ops.wm.open_mainfile(filepath=str(OUT / "edit.blend"))
     yield 1.0
 
@@ -286,7 +279,6 @@ class Film:
 
 
 def worked(film):
-    """Beside a picture that is made."""
     yield from film.picture_asked()
     for _ in range(PER_FRAME):
         random_.choice(WORK)()

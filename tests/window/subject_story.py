@@ -1,5 +1,5 @@
 """From an empty Video Editing file to a rendered Sharp Subject, by mouse and keyboard, in eight actions: one stroke
-finds the subject. Then it becomes an outline and a scribble. Run inside Blender, by test_tracked.py."""
+finds the subject. Then it becomes an outline and a scribble."""
 
 import os
 from pathlib import Path

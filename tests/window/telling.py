@@ -38,8 +38,15 @@ def backends(usual):
     return ["opengl", "vulkan"] if os.environ.get("SHUTTER_BACKENDS") == "both" else [usual]
 
 
+def built(folder, python, kind):
+    """A zip for Blender's Python on Linux: of the kind "linux_x64" or "no_wheels"."""
+    build = [sys.executable, ROOT / "scripts" / "build.py", "--output", folder / "dist", "--system", "linux-x64"]
+    subprocess.run([*build, "--python", python], check=True, capture_output=True)
+    (path,) = (folder / "dist").glob(f"*-{kind}.zip")
+    return path
+
+
 def linked(folder):
-    """The folder, whose Blender has the checkout for an extension."""
     extension = folder / "user" / "extensions" / "user_default" / "virtual_shutter"
     extension.parent.mkdir(parents=True)
     extension.symlink_to(ROOT)
@@ -78,12 +85,10 @@ def tell(story, backend, folder, *, before=(), screen=SCREEN, **given):
 
 
 def steps_of(seen):
-    """The entries of a story's steps, by their names."""
     return {entry["step"]: entry for entry in seen if "step" in entry}
 
 
 def facts_of(seen):
-    """All facts that a story noted, by their names."""
     return {name: value for entry in seen for name, value in entry.items()}
 
 
@@ -113,7 +118,6 @@ def excerpt(movie, frames, to, size):
 
 
 def noise(folder, count, size):
-    """The path of the first picture of a sequence of noise."""
     folder = folder / "frames"
     folder.mkdir()
     for number, frame in enumerate(np.random.default_rng(1).integers(0, 256, (count, *size[::-1], 3), dtype=np.uint8)):
@@ -133,6 +137,5 @@ def recipe(folder, bars, *strokes, width=0.1, keys=(), **more):
 
 
 def command_renders(source, recipe, output, *options):
-    """Pictures in a folder, as the command renders them on OpenGL."""
     options = ("--recipe", recipe, "--output", output, "--device", "opengl", *options)
     subprocess.run([sys.executable, "-m", "shutter_addon", "render", source, *options], check=True, cwd=ROOT)

@@ -6,8 +6,8 @@ import sys
 
 import av
 import numpy as np
-import pytest
-from telling import ROOT, needs_window, tell
+from screens import means
+from telling import ROOT, built, needs_window, tell
 
 from shutter_addon.media import open_source
 
@@ -21,23 +21,9 @@ FRAMES = 40, 55
 pytestmark = needs_window
 
 
-@pytest.fixture
-def zip_file(tmp_path, blenders_python):
-    """The zip for the Python of the Blender that is there."""
-    build = [sys.executable, ROOT / "scripts" / "build.py", "--output", tmp_path / "dist"]
-    subprocess.run([*build, "--python", blenders_python, "--system", "linux-x64"], check=True, capture_output=True)
-    (path,) = (tmp_path / "dist").glob("*-linux_x64.zip")
-    return path
-
-
-def means(picture):
-    """Means of 8 × 8 pixels, which a codec hardly touches."""
-    height, width = (n // 8 * 8 for n in picture.shape[:2])
-    return picture[:height, :width].reshape(height // 8, 8, width // 8, 8, 3).mean(axis=(1, 3), dtype=np.float32)
-
-
-def test_from_the_zip_to_a_finished_film(zip_file, bunny, tmp_path):
-    (noted,) = tell("finished_film", "opengl", tmp_path, zip=zip_file, recipe=RECIPE, frames="{}:{}".format(*FRAMES))
+def test_from_the_zip_to_a_finished_film(blenders_python, bunny, tmp_path):
+    given = {"zip": built(tmp_path, blenders_python, "linux_x64"), "recipe": RECIPE, "frames": "{}:{}".format(*FRAMES)}
+    (noted,) = tell("finished_film", "opengl", tmp_path, **given)
     recipe = json.loads(RECIPE.read_text())
     assert noted["shutters"] == [shutter["name"] for shutter in recipe["shutters"]]
     assert noted["regions"] == [region["name"] for region in recipe["regions"]]

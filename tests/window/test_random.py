@@ -1,14 +1,12 @@
 """Random operators in a real window; SHUTTER_SEEDS (1,2,3) and SHUTTER_STEPS (500) try others than CI does."""
 
 import os
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 from fresh import PACKAGES, installed
 from screens import pixels
-from telling import NO_NETWORK, ROOT, backends, command_renders, linked, needs_window, noise, recipe, tell
+from telling import NO_NETWORK, backends, built, command_renders, linked, needs_window, noise, recipe, tell
 
 pytestmark = needs_window
 
@@ -46,9 +44,7 @@ def test_random_operators(seed, backend, footage, tmp_path):
 @pytest.mark.parametrize("seed", SEEDS)
 def test_random_operators_of_the_zip_without_wheels(seed, footage, real_blender, blenders_python, tmp_path):
     """Installed in a Blender that has never seen the extension, without a network."""
-    build = [sys.executable, ROOT / "scripts" / "build.py", "--output", tmp_path / "dist"]
-    subprocess.run([*build, "--python", blenders_python, "--system", "linux-x64"], check=True, capture_output=True)
-    (path,) = (tmp_path / "dist").glob("*no_wheels.zip")
+    path = built(tmp_path, blenders_python, "no_wheels")
     given = {"footage": footage / "frames" / "0001.png", "recipe": footage / "recipe.json"}
     given["hidden"] = " ".join(PACKAGES)
     installed([*NO_NETWORK, *real_blender], path, tmp_path / "user")

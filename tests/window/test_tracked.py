@@ -16,13 +16,8 @@ def test_one_stroke(tmp_path):
     """Drawn inside a walker, tracked, mended, stopped by Esc: where the stroke is, the film is as sharp as its source,
     and those who walk beside are not."""
     footage = ROOT / "assets" / "walkers.mp4"
-    seen = tell(
-        "one_stroke_story",
-        "opengl",
-        linked(tmp_path),
-        footage=shutil.copy(footage, tmp_path),
-        packages=packages(tmp_path),
-    )
+    given = {"footage": shutil.copy(footage, tmp_path), "packages": packages(tmp_path)}
+    seen = tell("one_stroke_story", "opengl", linked(tmp_path), **given)
     facts = facts_of(seen)
     assert facts["edge_aware"] > 0.9
     for name, edited in (("tracked", ["70"]), ("mended", ["70", "85"]), ("escaped", ["70", "85"])):

@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 import pytest
-from screens import TOLERANCE, assert_alike, crop, pixels
+from screens import TOLERANCE, assert_alike, crop, means, pixels
 from telling import BUNNY, SMALL, backends, excerpt, linked, needs_window, packages, steps_of, tell
 
 pytestmark = needs_window
@@ -17,14 +17,11 @@ def told(request, tmp_path_factory):
     return folder, tell("story", request.param, linked(folder), footage=footage)
 
 
-def test_no_exception_reaches_the_console(told):
-    assert "Error" not in (told[0] / "console.txt").read_text()
-
-
 def test_every_step_is_undone_and_redone(told):
-    """Data is compared in the window; here, what the preview showed."""
+    """Data is compared in the window; here, what the preview showed. No exception reaches the console."""
     folder, seen = told
     steps = steps_of(seen)
+    assert "Error" not in (folder / "console.txt").read_text()
     repeated = [name for name in steps if name.endswith(("_undo", "_redo"))]
     assert len(repeated) == 14
     for name in repeated:
@@ -53,38 +50,22 @@ def test_a_loaded_file_shows_what_was_saved(told):
 
 
 def test_preview_and_render_agree(told):
-    """With the live preview, without it, and as rendered by a job of its own."""
+    """The live preview, the preview without it, what is drawn over it, and View ▸ Render Sequencer Animation: with what
+    is rendered by a job of its own."""
     folder, seen = told
     boxes = {entry["picture"]: entry.get("box") for entry in seen if "picture" in entry}
     final = pixels(folder / "final.png")
     for name in ("live", "sequencer"):
         assert_alike(pixels(folder / f"{name}.png", boxes[name]), final, folder / f"{name}_difference.png")
-
-
-def test_the_sequencers_own_animation_agrees(told):
-    """View ▸ Render Sequencer Animation, for which the window waits."""
-    folder, _seen = told
     first, second = (pixels(path) for path in sorted(folder.glob("animation_*.png")))
-    assert_alike(first, pixels(folder / "final.png"), folder / "animation_difference.png")
+    assert_alike(first, final, folder / "animation_difference.png")
     assert np.abs(second - first).max() > TOLERANCE
-
-
-def test_what_is_drawn_over_the_preview_agrees(told):
-    """All but colours next to black: Blender keeps what is drawn in 8 bits, and shows them with a gamma of 2.2. What is
-    drawn was composed in levels, which costs one of them."""
-    folder, seen = told
-    box = next(entry["box"] for entry in seen if entry.get("picture") == "drawn")
-    drawn, final = pixels(folder / "drawn.png", box), pixels(folder / "final.png")
-    dark = final < 8
+    # But next to black: Blender keeps what is drawn in 8 bits, and shows them with a gamma of 2.2. What is drawn was
+    # composed in levels, which costs one of them.
+    drawn, dark = pixels(folder / "drawn.png", boxes["drawn"]), final < 8
     assert dark.mean() < 0.2
     assert_alike(np.where(dark, 0, drawn), np.where(dark, 0, final), folder / "drawn_difference.png", TOLERANCE + 1)
     assert np.abs(drawn - final).max() <= 6
-
-
-def block_means(picture, side=8):
-    """Of squares of the screen, however pictures are enlarged to it."""
-    height, width = (length // side for length in picture.shape[:2])
-    return picture[: height * side, : width * side].reshape(height, side, width, side, 3).mean(axis=(1, 3))
 
 
 def test_previews_of_any_size_and_renders_after_them(tmp_path):
@@ -113,7 +94,7 @@ def test_previews_of_any_size_and_renders_after_them(tmp_path):
     ):
         assert np.abs(pictures[name] - pictures[other]).mean() < most, name
     assert np.abs(pictures["proxy"] - pictures["at_25"]).mean() > 2  # Blender's lose much
-    ours, blenders = (block_means(pictures[name]) for name in ("proxy_still", "proxy_by_blender"))
+    ours, blenders = (means(pictures[name]) for name in ("proxy_still", "proxy_by_blender"))
     assert np.abs(ours - blenders).mean() < 1.5
     assert (pictures["waveform"] > 60).mean() > 0.05
     (played,) = (entry for entry in seen if "drawn" in entry)
@@ -146,10 +127,7 @@ def test_one_look_at_full_quality(backend, tmp_path):
     full, final = pixels(tmp_path / "full.png"), pixels(tmp_path / "final.png")
     left, top, width, height = steps["full"]["crop"]
     x, y = steps["full"]["middle"]
-    rows, columns = (
-        (top + 90, top + height - 40),
-        (left + width // 2 + 60, left + width // 2 + 150),
-    )  # beside notes and bars
+    rows, columns = (top + 90, top + height - 40), (left + width // 2 + 60, left + width // 2 + 150)  # beside bars
     patch = full[slice(*rows), slice(*columns)]
     # Where the view lies on the picture Blender tells to a pixel.
     places = [(rows[0] - y + 90 + down, columns[0] - x + 160 + right) for down in (0, 1) for right in (-1, 0)]

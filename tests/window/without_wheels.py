@@ -1,7 +1,5 @@
 """The extension without any wheel, on pictures: Blender's GPU shows them, and renders them for another thread. Then on
-a movie, which a second Blender decodes.
-
-Run in a Blender with a window, the checkout linked as an extension."""
+a movie, which a second Blender decodes."""
 
 import os
 
@@ -25,7 +23,6 @@ def add_shutter(strip):
 
 
 def rendered():
-    """The current frame, by a job of the window."""
     render("job.png", write_still=True)
     yield from render_ended()
 
