@@ -55,17 +55,6 @@ def assert_same(path, *, deinterlace=False):
             assert most <= (DEEP if theirs.dtype == np.uint16 else 0), (path.name, index, most)
 
 
-def test_where_no_pipe_may_be_enlarged_movies_are_read(movies, monkeypatch):
-    """As on Linux, for a user who has many large ones."""
-    fcntl = pytest.importorskip("fcntl", reason="other systems have no such call")
-    monkeypatch.setattr(fcntl, "fcntl", mock.Mock(side_effect=PermissionError))
-    blender_movie.lend(None)
-    blender_movie.lend([sys.executable, str(SCRIPT)])
-    path, numbers = movies["b_frames.mp4"]
-    with BlenderMovie(path) as source:
-        assert number(source.read(2)) == numbers[2]
-
-
 def test_movies_are_those_that_pyav_decodes(movies, coloured, deinterlaced):
     for path in (*(path for path, _numbers in movies.values()), *coloured.values()):
         assert_same(path)
@@ -203,25 +192,6 @@ def test_an_answer_that_nobody_waited_for_is_not_the_next_one(movies, monkeypatc
             source.read(3)
         monkeypatch.undo()
         assert number(source.read(7)) == numbers[7]
-
-
-@pytest.mark.skipif(os.name != "posix", reason="processes are stopped by signals there alone")
-def test_a_blender_that_was_stopped_is_followed_by_another(movies, monkeypatch):
-    with BlenderMovie(movies["open.mp4"][0]) as source, ThreadPoolExecutor(1) as pool:
-        before, stopped, own = source.read(3), process(), blender_movie._killed_after  # private: others take a minute
-
-        def killed_soon(seconds, process):
-            return own(0.1 if process.pid == stopped else seconds, process)
-
-        monkeypatch.setattr(blender_movie, "_killed_after", killed_soon)  # private: as above
-        os.kill(stopped, signal.SIGSTOP)
-        try:
-            again = pool.submit(source.read, 3).result(90)
-        finally:
-            with suppress(ProcessLookupError):
-                os.kill(stopped, signal.SIGCONT)
-        assert (again == before).all()
-        assert process() != stopped
 
 
 SILENT = [sys.executable, "-c", "import time; time.sleep(600)"]
