@@ -74,7 +74,7 @@ def video_editing_opened():
 
 
 def composing(previews):
-    return previews.looking.slices.last is not None or previews.smooth_previews.is_busy()
+    return previews.looking.slices.last is not None or part("features.smooth.blender.smooth_previews").is_busy()
 
 
 def play(story, seconds=STEP):

@@ -29,7 +29,7 @@ def shown():
     frame = edit().frame_current % FRAMES + 1
     edit().frame_set(frame)
     area_of("SEQUENCE_EDITOR", "PREVIEW").tag_redraw()
-    window = sessions().WINDOW
+    window = sessions().SESSIONS.window
     # As in `held`.
     yield from until(lambda: window._renderers and held(window)[1], "the preview is composed", 60)
     yield 1.0
@@ -55,7 +55,7 @@ def steps():
     preferences = bpy.context.preferences.addons[NAME].preferences
     preferences.gpu_memory = MEGABYTES
     sessions().close_if_device_changed()
-    window, offscreen = sessions().WINDOW, sessions().OFFSCREEN
+    window, offscreen = sessions().SESSIONS.window, sessions().SESSIONS.offscreen
     for device in ("OPENGL", "BLENDER"):
         preferences.device = device
         yield from shown()

@@ -37,7 +37,7 @@ def outlined():
 
 def carried():
     """A straight outline stands in until it is."""
-    carrying = part("blender.rendering.outline_carrying")
+    carrying = part("features.outlines.blender.outline_carrying")
     driver.edit().frame_set(FRAME)
     yield from driver.until(lambda: carrying.progress() is not None, "it is carried", 20, wait=0.02)
     yield from driver.until(lambda: carrying.progress() is None, "it is there", 60)
@@ -52,7 +52,10 @@ def carried():
 
 def mended():
     """The carried curve is pulled up at her head, and let go again by Esc; then that is undone."""
-    drawings, gizmo = part("blender.editing.outline_drawings"), part("blender.interface.outline_operators")
+    drawings, gizmo = (
+        part("features.outlines.blender.outline_drawings"),
+        part("features.outlines.blender.outline_operators"),
+    )
     before = shapes()
     with driver.override("PREVIEW"):
         scene, effect, strip = part("blender.data.selection").active(bpy.context)
@@ -81,7 +84,7 @@ def shapes():
 
 def needed():
     """Next Drawing Needed carries what is lacking, and goes where both sides agree least, if they do not agree."""
-    carrying = part("blender.rendering.outline_carrying")
+    carrying = part("features.outlines.blender.outline_carrying")
     with driver.override("PREVIEW"):
         bpy.ops.shutter.outline_needed("INVOKE_DEFAULT")
     yield from driver.until(lambda: not is_carrying() and carrying.progress() is None, "all is carried", 90)

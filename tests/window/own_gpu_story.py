@@ -15,7 +15,7 @@ def written(folder):
 
 def held():
     # The one that renders just now: to ask for it would make another where there is none.
-    device = part("blender.rendering.sessions").OFFSCREEN._compositor.result().device
+    device = part("blender.rendering.sessions").SESSIONS.offscreen._compositor.result().device
     # The budget counts the preview's as well.
     return type(device).__name__, device.name, sum(texture.bytes for texture in device._held)
 

@@ -22,7 +22,7 @@ def space():
 def composed():
     """The sizes of what the window's session holds, and whether that is read from a proxy."""
     # What was composed, in place of what would be now.
-    sources = [renderer.source for _key, renderer in sessions().WINDOW._renderers.values()]
+    sources = [renderer.source for _key, renderer in sessions().SESSIONS.window._renderers.values()]
     return [[source.width, source.height] + ["proxy"] * source.from_proxy for source in sources]
 
 
@@ -137,7 +137,7 @@ def kept_time():
     edit, drawn = driver.edit(), []
 
     def note():
-        ((_snapshot, _frame, request),) = sessions().WINDOW.requests.values()  # what was drawn, as above
+        ((_snapshot, _frame, request),) = sessions().SESSIONS.window.requests.values()  # what was drawn, as above
         drawn.append((time.perf_counter(), edit.frame_current, request.index))
 
     kept, edit.sync_mode = edit.sync_mode, "FRAME_DROP"

@@ -60,7 +60,7 @@ def steps():
     key("Escape")
     yield from until(lambda: not rendering(), "Esc ends the render", 60, wait=TICK)
     ended = passes.all
-    last = threading.Thread(target=part("blender.rendering.sessions").OFFSCREEN.run, args=(lambda: None,))
+    last = threading.Thread(target=part("blender.rendering.sessions").SESSIONS.offscreen.run, args=(lambda: None,))
     last.start()
     yield from until(lambda: not last.is_alive(), "the render's device is free", 60, wait=TICK)
     saw(after=passes.all - ended, whole=passes.whole[0], finished_after=len(passes.whole) - whole)

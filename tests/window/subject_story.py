@@ -28,13 +28,15 @@ def region():
 
 
 def is_carrying():
-    return part("blender.rendering.outline_carrying").progress() is not None
+    return part("features.outlines.blender.outline_carrying").progress() is not None
 
 
 def curves():
     with driver.override("PREVIEW"):
         scene, effect, strip = part("blender.data.selection").active(bpy.context)
-        return part("blender.editing.outline_drawings").shown_curves(scene, effect, strip, effect.active_region)
+        return part("features.outlines.blender.outline_drawings").shown_curves(
+            scene, effect, strip, effect.active_region
+        )
 
 
 def stroke_drawn():
