@@ -1,7 +1,4 @@
-"""The layers: core, media and compute never import bpy, and core needs no GL and no media libraries.
-
-What features are: shutter_addon/features/__init__.py.
-"""
+"""The layers: core, media and compute never import bpy, and core needs no GL and no media libraries."""
 
 import ast
 import re
