@@ -72,8 +72,7 @@ def preset_menu(layout: UILayout, _context: Context) -> None:
 
 @menu("regions", "Region Specials")
 def region_menu(layout: UILayout, _context: Context) -> None:
-    for draw_new in features.each("draw_new"):
-        draw_new(layout)
+    features.call("draw_new", layout)
     draw_operators(layout, "", "matte_add", "matte_strip", "matte_mask", "outline_from_mask", "ramp_add")
     draw_operators(layout, "", "time_map", "rolling_shutter", "find_readout")
 
@@ -114,8 +113,7 @@ class SEQUENCER_PT_shutter(Panel):
             row.operator("shutter.draw", text="Not This", icon="X").not_this = True
         draw_operators(row, "erase")
         row.menu("SHUTTER_MT_regions", text="", icon="DOWNARROW_HLT")
-        for draw_tracking in features.each("draw_tracking"):
-            draw_tracking(layout, effect.active_region, is_subject)
+        features.call("draw_tracking", layout, effect.active_region, is_subject)
         draw_operators(layout.row(align=True), "sharp_subject", "panning_shot", "clean_trail")
 
 
@@ -134,8 +132,7 @@ def _draw_exposure(layout: UILayout, scene: Scene, effect: PropertyGroup, strip:
     row.operator("shutter.bars_key", text="", icon="KEY_HLT")
     row.operator("shutter.bars_unkey", text="", icon="KEY_DEHLT")
     layout.prop(effect, "window")
-    for draw_smooth in features.each("draw_smooth"):
-        draw_smooth(layout, effect)
+    features.call("draw_smooth", layout, effect)
     layout.prop(shutter, "length")
     if shutter.length == "MOTION" and shutter.follow != "NOTHING":
         layout.prop(shutter, "trail")
@@ -244,9 +241,8 @@ class SHUTTER_PT_notes(Panel):
             sentence(column, words, "INFO")
             if operator:
                 column.operator(operator)
-        for draw_tracked in features.each("draw_tracked"):
-            for index in _tracked(effect):
-                draw_tracked(layout, effect, index)
+        for index in _tracked(effect):
+            features.call("draw_tracked", layout, effect, index)
 
 
 def _draw_move(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:
@@ -257,8 +253,7 @@ def _draw_move(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: S
     if shutter.follow != "NOTHING":
         draw_properties(layout, shutter, "follow_motion", "follow_smooth")
     if shutter.follow == "CAMERA":
-        for draw_tracking in features.each("draw_tracking"):
-            draw_tracking(layout, None)
+        features.call("draw_tracking", layout, None)
 
 
 def _draw_options(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:

@@ -186,15 +186,13 @@ def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, s
     if settings.view not in ("SCRIBBLES", "COEFFICIENTS"):
         _show_strokes(context, quad, shown, wanted.decision.snapshot)
     previews.looking.slices.end()
-    for note_tracking in features.each("note_tracking"):
-        note_tracking(say)
+    features.call("note_tracking", say)
     for sentence in pictures.shortages(renderer, wanted.decision.snapshot, request):
         say(sentence)
     # Measuring would slow down what is running.
     decision = wanted.decision
     if context.space_data.show_overlays and is_still and not decision.is_plain and not previews.may_be_late():
-        for note_streaks in features.each("note_streaks"):
-            note_streaks(shown.effect, decision.snapshot, renderer, decision.request, say)
+        features.call("note_streaks", shown.effect, decision.snapshot, renderer, decision.request, say)
 
 
 def _warn(shown: Shown, say: Say) -> None:

@@ -107,7 +107,6 @@ def drop_removed() -> None:
 
 def forget(*_: object) -> None:
     """Close all sources and free the devices, when a file is loaded or the extension is disabled."""
-    for forget_pictures in features.each("forget_pictures"):
-        forget_pictures()
+    features.call("forget_pictures")
     for session in SESSIONS:
         session.forget()
