@@ -204,10 +204,8 @@ def bars_key(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
 @operator("Delete Bar Keyframes", needs.a_shutter, icon="KEY_DEHLT")
 def bars_unkey(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
     """Delete the keyframes of all bars of the active shutter at the current frame"""
-    if not bar_edits.unkey_bars(effect, effect.active_shutter):
-        report(self, rpt_("No bar has a keyframe at the current frame"))
-        return {"CANCELLED"}
-    return None
+    is_deleted = bar_edits.unkey_bars(effect, effect.active_shutter)
+    return None if is_deleted else report(self, rpt_("No bar has a keyframe at the current frame"))
 
 
 class SHUTTER_OT_bar_set(OfEffect, Operator):
@@ -403,8 +401,8 @@ class SHUTTER_OT_copy_report(Named, Operator):
 
     def execute(self, context: Context) -> set[str]:
         if bpy.app.background:
-            report(self, rpt_("Without a window there is no clipboard: use the command check with --report"), "ERROR")
-            return {"CANCELLED"}
+            words = rpt_("Without a window there is no clipboard: use the command check with --report")
+            return report(self, words, "ERROR")
         context.window_manager.clipboard = error_report.text(selection.scene_of(context))
         self.report({"INFO"}, rpt_("Report copied: paste it into your message and read it before you send it"))
         return {"FINISHED"}

@@ -86,8 +86,7 @@ def outline_draw(self: Operator, _context: Context, effect: PropertyGroup) -> se
     scene, strip, index = self.edit, self.effect_strip, effect.active_region
     curves = outline_drawings.curves_now(scene, effect, strip, index)
     if not curves:
-        report(self, rpt_("The outline is empty at the current frame"))
-        return {"CANCELLED"}
+        return report(self, rpt_("The outline is empty at the current frame"))
     region_edits.draw_curves(effect, strip, effect.regions[index], curves, scene.frame_current)
     return None
 
@@ -95,19 +94,16 @@ def outline_draw(self: Operator, _context: Context, effect: PropertyGroup) -> se
 @operator("Find Outline", needs.strokes, only_seen=True)
 def outline_it(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
     """Make the active region an outline of the subject that its strokes mark or enclose at this frame"""
-    if not outline_drawings.outline_it(self.edit, effect, self.effect_strip, effect.active_region):
-        report(self, rpt_("No subject stands out from its surroundings"))
-        return {"CANCELLED"}
-    return None
+    is_found = outline_drawings.outline_it(self.edit, effect, self.effect_strip, effect.active_region)
+    return None if is_found else report(self, rpt_("No subject stands out from its surroundings"))
 
 
 @operator("Find Subject", needs.strokes, only_seen=True)
 def subject_find(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
     """Make the active region a subject, which a model finds under its strokes at this frame and follows"""
-    if not subjects.find(self.edit, effect, self.effect_strip, effect.active_region):
-        report(self, rpt_("The model finds no subject under the stroke: draw along its middle, or outline it"))
-        return {"CANCELLED"}
-    return None
+    if subjects.find(self.edit, effect, self.effect_strip, effect.active_region):
+        return None
+    return report(self, rpt_("The model finds no subject under the stroke: draw along its middle, or outline it"))
 
 
 @operator("Scribble", needs.a_subject, icon="IPO_LINEAR")
@@ -119,10 +115,8 @@ def subject_scribble(_self: Operator, _context: Context, effect: PropertyGroup) 
 @operator("Outline", needs.a_subject, icon="CURVE_BEZCIRCLE", only_seen=True)
 def subject_outline(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
     """Make the active subject an outline, which is drawn where the subject has strokes"""
-    if not subjects.to_outline(self.edit, effect, self.effect_strip, effect.active_region):
-        report(self, rpt_("The subject has no outline there"))
-        return {"CANCELLED"}
-    return None
+    has_outline = subjects.to_outline(self.edit, effect, self.effect_strip, effect.active_region)
+    return None if has_outline else report(self, rpt_("The subject has no outline there"))
 
 
 def after_stroke(context: Context, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
