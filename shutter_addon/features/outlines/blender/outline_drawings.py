@@ -1,4 +1,4 @@
-"""Draw outlines: correct a tracked outline, find where a drawing is needed, and convert between outlines and masks.
+"""Draw outlines: correct a tracked outline, find where a drawing is needed, and convert regions to subjects and back.
 
 Annotations have no key types in Blender 5.2, so the Dope Sheet shows generated and hand-made drawings the same way.
 """
@@ -53,25 +53,6 @@ def shown_curves(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) 
     return revision.until_change("outline", key, lambda: curves_now(scene, effect, strip, index))
 
 
-def picture_now(scene: Scene, effect: PropertyGroup, strip: Strip) -> np.ndarray:
-    """Return the source frame (H, W, 3) uint8 that the current frame shows.
-
-    Raises:
-        EffectError, MediaError: there is none.
-    """
-    shown = snapshot.take(scene, effect, strip, (scene.frame_current,))
-    with effect_source.open_source(shown) as source:
-        samples = source.read(effect_source.clip_of(shown, source).shown(scene.frame_current).source_frame)
-        return flow.displayed(samples, source.transfer, source.alpha)
-
-
-def nearest(effect: PropertyGroup, index: int, frame: int) -> int:
-    """Return the timeline frame of a region's drawing that is nearest to `frame`, or `frame` if there is no drawing."""
-    layer = layer_of(effect, effect.regions[index])
-    drawn = [drawing.frame_number for drawing in layer.frames] if layer else []
-    return min(drawn, key=lambda each: abs(each - frame), default=frame)
-
-
 def outline_it(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> bool:
     """Make a region the outline of the subject under or inside its strokes at the current frame.
 
@@ -85,7 +66,10 @@ def outline_it(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) ->
     strokes = there.drawings.at(frame) if region.kind == "OUTLINE" else there.at(frame).strokes
     if not len(strokes):
         raise EffectError(rpt_("The region has no strokes at the current frame"))
-    picture = picture_now(scene, effect, strip)
+    taken = snapshot.take(scene, effect, strip, (frame,))
+    with effect_source.open_source(taken) as source:
+        samples = source.read(effect_source.clip_of(taken, source).shown(frame).source_frame)
+        picture = flow.displayed(samples, source.transfer, source.alpha)
     width, height = carrying.working_size(*picture.shape[1::-1])
     encloses = region.kind != "LINE"
     shape = scribbles.Shape(shutter=0, kind="line", width=region.width, strokes=tuple(strokes))
@@ -136,3 +120,63 @@ def next_needed(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -
         return None, enough
     worst = sorted(frame for frame, share in sure.items() if share == least)
     return worst[len(worst) // 2], least
+
+
+def find_subject(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> bool:
+    """Make a region a subject if the model finds one under the strokes that are nearest to the current frame; an
+    outline becomes one by its drawings, which stay.
+
+    Returns:
+        Whether it has found one.
+
+    Raises:
+        EffectError: There are no strokes.
+        MediaError: There is no picture or no model.
+    """
+    region, before = effect.regions[index], effect.regions[index].kind
+    if before == "OUTLINE":
+        region.kind, region.layer, region.outline_layer = "SUBJECT", "", region.layer
+        return True
+    layer, frame = layer_of(effect, region), scene.frame_current
+    drawn = [drawing.frame_number for drawing in layer.frames] if layer else []
+    frame = min(drawn, key=lambda each: abs(each - frame), default=frame)
+    if not snapshot.strokes_at(scene, effect, strip, index, frame):
+        raise EffectError(rpt_("The region has no strokes at the current frame"))
+    region.kind, is_found = "SUBJECT", False
+    try:
+        file, shown = snapshot.carried_outline(scene, effect, strip, index, (frame,))
+        with closing(file.open()) as mattes:  # its first matte is kept, and shown at once
+            mattes.read(shown[frame])
+            is_found = bool(mattes.confidence(shown[frame]))
+    finally:
+        if not is_found:
+            region.kind = before
+    if is_found:
+        region.motion = "LOCATION"
+    return is_found
+
+
+def to_outline(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> bool:
+    """Make a subject an outline, which is drawn where the subject has strokes or drawings.
+
+    Returns:
+        Whether it encloses anything.
+
+    Raises:
+        EffectError, MediaError: Its mattes cannot be made.
+    """
+    region = effect.regions[index]
+    layers = [layer_of(effect, region, name) for name in ("layer", "outline_layer")]
+    frames = sorted({drawing.frame_number for layer in layers if layer for drawing in layer.frames})
+    file, shown = snapshot.carried_outline(scene, effect, strip, index, frames)
+    with closing(file.open()) as mattes:
+        for frame in frames:
+            mattes.read(shown[frame])
+        curves = {frame: mattes.curves(shown[frame]) for frame in frames}
+    if not any(curves.values()):
+        return False
+    region_edits.remove_layers(effect, region)
+    region.kind = "OUTLINE"
+    for frame, drawn in curves.items():
+        region_edits.draw_curves(effect, strip, region, drawn, frame)
+    return True

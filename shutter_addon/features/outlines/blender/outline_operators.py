@@ -10,6 +10,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import Context, Event, Gizmo, GizmoGroup, Operator, PropertyGroup, Scene, Strip, UILayout
 
 from ....blender.data import selection, strips
+from ....blender.data.annotations import layer_of
 from ....blender.editing import region_edits
 from ....blender.interface import drawing, needs
 from ....blender.interface.gizmo_groups import Dragged, View, WithKeys, view
@@ -19,7 +20,7 @@ from ....blender.rendering import previews
 from ....blender.rendering.effect_source import FAULTS
 from ....core.messages import UserError
 from ....core.model import outlines
-from . import outline_carrying, outline_drawings, subjects
+from . import outline_carrying, outline_drawings
 
 _COLOR = (0.2, 0.9, 1.0, 0.9)
 _NEAR = 6  # interface units from the pointer to a curve that it can grab
@@ -101,7 +102,7 @@ def outline_it(self: Operator, _context: Context, effect: PropertyGroup) -> set[
 @operator("Find Subject", needs.strokes, only_seen=True)
 def subject_find(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
     """Make the active region a subject, which a model finds under its strokes at this frame and follows"""
-    if subjects.find(self.edit, effect, self.effect_strip, effect.active_region):
+    if outline_drawings.find_subject(self.edit, effect, self.effect_strip, effect.active_region):
         return None
     return report(self, rpt_("The model finds no subject under the stroke: draw along its middle, or outline it"))
 
@@ -115,16 +116,19 @@ def subject_scribble(_self: Operator, _context: Context, effect: PropertyGroup) 
 @operator("Outline", needs.a_subject, icon="CURVE_BEZCIRCLE", only_seen=True)
 def subject_outline(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
     """Make the active subject an outline, which is drawn where the subject has strokes"""
-    has_outline = subjects.to_outline(self.edit, effect, self.effect_strip, effect.active_region)
+    has_outline = outline_drawings.to_outline(self.edit, effect, self.effect_strip, effect.active_region)
     return None if has_outline else report(self, rpt_("The subject has no outline there"))
 
 
 def after_stroke(context: Context, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
     """Look for a subject under the first stroke of a new effect; the pen draws on the subject from now on."""
-    if not subjects.is_first_stroke(effect, effect.regions[effect.active_region]):
+    region = effect.regions[effect.active_region]
+    layer = layer_of(effect, region)
+    drawn = sum(len(drawing.strokes) for drawing in layer.frames) if layer else 0
+    if not (region.finds_subject and region.kind == "LINE" and drawn == 1):
         return
     try:
-        is_found = subjects.find(scene, effect, strip, effect.active_region)
+        is_found = outline_drawings.find_subject(scene, effect, strip, effect.active_region)
     except (*FAULTS, UserError) as error:
         popup(context, str(error), icon="ERROR")
         return
