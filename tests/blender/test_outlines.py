@@ -7,7 +7,7 @@ from support import effect_of, image_strip, recipe, request, write_frames
 
 from shutter_addon.blender.data import selection, snapshot
 from shutter_addon.blender.editing import region_edits
-from shutter_addon.blender.rendering import sessions
+from shutter_addon.blender.rendering import previews, sessions
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import outlines
 from shutter_addon.features.outlines.blender import outline_carrying, outline_drawings
@@ -275,16 +275,18 @@ def test_masks_that_give_no_outline(bpy, chosen):
     assert len(effect.regions) == 1
 
 
-def test_what_fails_beside_blender_is_told_once(bpy):
+def test_what_fails_beside_blender_is_told_once(bpy, monkeypatch):
     """Whatever it is: else the file would be asked for with every look at the preview."""
-    file, arrived = CarriedFile(footage=Unreadable(), drawings=((0, outlines.curves(square(0))),)), []
-    outline_carrying.carry(file, [0], lambda: arrived.append(True))
+    file, arrived, said = CarriedFile(footage=Unreadable(), drawings=((0, outlines.curves(square(0))),)), [], []
+    monkeypatch.setattr(previews, "show_carried", lambda: arrived.append(True))
+    outline_carrying.carry(file, [0])
     outline_carrying._mattes.carrying.future.exception()  # waits for the thread
     assert outline_carrying._look() is None  # the timer, which no Blender without a window calls
     assert arrived == [True]
     assert outline_carrying.failure(file) == "internal error: RuntimeError('of a library')"
     outline_carrying.want_matte(file, 0)
-    assert outline_carrying.begin(lambda: None) == outline_carrying.failure(file)
+    outline_carrying.note_tracking(said.append)
+    assert said == [f"Shutter: {outline_carrying.failure(file)}"]
     assert outline_carrying.progress() is None
     outline_carrying.forget_pictures()
 

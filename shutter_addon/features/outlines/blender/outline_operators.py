@@ -48,7 +48,7 @@ class SHUTTER_OT_outline_needed(Beside, OfEffect, Operator):
         if waits or not frames:
             return self._go(context)
         self._file = file
-        outline_carrying.carry(file, frames, previews.show_carried, shown.get(scene.frame_current))
+        outline_carrying.carry(file, frames, shown.get(scene.frame_current))
         return self.go_on(context)
 
     def goes_on(self, _context: Context) -> bool:
