@@ -20,7 +20,7 @@ from ....blender.data import snapshot, source_media, strips, validation
 from ....blender.data.consistency import bars
 from ....blender.data.sampled import Sampling
 from ....blender.editing import bar_edits, region_edits, shutter_edits
-from ....blender.interface.operator_bases import OfEffect, operator
+from ....blender.interface.operator_bases import operator
 from ....core.messages import EffectError
 from ....core.model.choices import CONTEXT, READS, SIDES
 from ....core.model.frame_state import Options
@@ -87,7 +87,11 @@ def repair(scene: Scene, effect: PropertyGroup, strip: Strip, share: float, side
     Raises:
         EffectError, MediaError: it has no room, the footage cannot be read, or OpenCV is missing. Nothing has changed.
     """
-    backward = _is_backward(scene, effect, strip)
+    frame = scene.frame_current
+    if (time := Sampling.of(scene, effect, strip, (frame,)).time) is not None:
+        backward = bool(time.at(frame)[1])
+    else:
+        backward = source_media.timing_of(strips.source_of(scene, effect, strip)).use_reverse_frames
     known = of(effect)
     if known is None and (sentence := region_edits.why_full(effect, regions=1, shutters=2)):
         raise EffectError(sentence)
@@ -111,14 +115,6 @@ def repair(scene: Scene, effect: PropertyGroup, strip: Strip, share: float, side
         bar_edits.paint(effect, effect.shutters.find(shutter.name), np.eye(effect.window)[place])
     effect.active_shutter = effect.shutters.find(later.name)
     effect.active_region = list(effect.regions).index(region)
-
-
-def _is_backward(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
-    """Return whether the source runs backward at the current frame."""
-    frame = scene.frame_current
-    if (time := Sampling.of(scene, effect, strip, (frame,)).time) is not None:
-        return bool(time.at(frame)[1])
-    return bool(source_media.timing_of(strips.source_of(scene, effect, strip)).use_reverse_frames)
 
 
 def find(scene: Scene, effect: PropertyGroup, strip: Strip, *, columns: bool) -> tuple[float, str]:
@@ -157,43 +153,36 @@ def _why_no_repair(effect: PropertyGroup) -> str | None:
     return None if has_repair else region_edits.why_full(effect, regions=1, shutters=2)
 
 
-class SHUTTER_OT_rolling_shutter(OfEffect, Operator):
-    """Show every row as it was when the middle one was filmed, so that skewed lines become straight"""
-
-    bl_label = "Rolling Shutter Repair"
-    icon = "CAMERA_DATA"
-    choices = "side"
-    needs = (_why_no_repair,)
-
-    side: EnumProperty(
-        name="Read First",
-        description="The side of the picture that the sensor reads first",
-        items=SIDES,
-        translation_context=CONTEXT,
-    )
-    readout: FloatProperty(
-        name="Readout",
-        description="Time from reading the first row to the last, as a percentage of a frame",
-        subtype="PERCENTAGE",
-        default=50.0,
-        min=1.0,
-        max=100.0,
-        options={"SKIP_SAVE"},
-    )
-
-    def change(self, _context: Context, effect: PropertyGroup) -> None:
-        known = of(effect)
-        if known is not None and not self.properties.is_property_set("readout"):
-            self.readout = 100 * known.readout  # choosing a side in the menu keeps the readout
-        repair(self.edit, effect, self.effect_strip, self.readout / 100, self.side)
-
-
+_SIDE = EnumProperty(
+    name="Read First",
+    description="The side of the picture that the sensor reads first",
+    items=SIDES,
+    translation_context=CONTEXT,
+)
+_READOUT = FloatProperty(
+    name="Readout",
+    description="Time from reading the first row to the last, as a percentage of a frame",
+    subtype="PERCENTAGE",
+    default=50.0,
+    min=1.0,
+    max=100.0,
+    options={"SKIP_SAVE"},
+)
 _READS = EnumProperty(
     name="Reads",
     description="Whether the sensor reads row by row or column by column",
     items=READS,
     translation_context=CONTEXT,
 )
+
+
+@operator("Rolling Shutter Repair", _why_no_repair, icon="CAMERA_DATA", side=_SIDE, readout=_READOUT)
+def rolling_shutter(self: Operator, _context: Context, effect: PropertyGroup) -> None:
+    """Show every row as it was when the middle one was filmed, so that skewed lines become straight"""
+    known = of(effect)
+    if known is not None and not self.properties.is_property_set("readout"):
+        self.readout = 100 * known.readout  # choosing a side in the menu keeps the readout
+    repair(self.edit, effect, self.effect_strip, self.readout / 100, self.side)
 
 
 @operator("Find Readout", _why_no_repair, icon="VIEWZOOM", reads=_READS)
