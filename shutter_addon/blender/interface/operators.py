@@ -20,7 +20,6 @@ from ..devices import main_thread
 from ..editing import (
     add_effect,
     bar_edits,
-    drawn_places,
     motion_keys,
     region_edits,
     shown_annotations,
@@ -265,7 +264,7 @@ class SHUTTER_OT_draw(MakesEffect, OfEffect, Operator):
             if sentence := region_edits.why_full(effect, regions=1):  # poll() does not know the value of `new`
                 raise EffectError(sentence)
             region_edits.first_drawn(effect, selection.active_shutter(effect), self.kind)
-        drawn_places.begin(effect, self.effect_strip, effect.active_region)
+        region_edits.begin_drawing(effect, self.effect_strip, effect.active_region)
         layer = "not_layer" if self.not_this else "layer"
         if not drawing_tool(context, effect, "builtin.annotate", layer):
             self.report({"INFO"}, "Open a sequencer with a preview to draw")
@@ -275,7 +274,7 @@ class SHUTTER_OT_draw(MakesEffect, OfEffect, Operator):
 @operator("Erase", needs.strokes, only_seen=True)
 def erase(self: Operator, context: Context, effect: PropertyGroup) -> None:
     """Erase strokes of the active region in the preview"""
-    drawn_places.begin(effect, self.effect_strip, effect.active_region, erases=True)
+    region_edits.begin_drawing(effect, self.effect_strip, effect.active_region, erases=True)
     if not drawing_tool(context, effect, "builtin.annotate_eraser"):
         self.report({"INFO"}, "Open a sequencer with a preview to erase")
 
