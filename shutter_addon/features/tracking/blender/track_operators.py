@@ -16,7 +16,7 @@ from ....blender.interface.operator_bases import Beside, OfEffect, given, operat
 from ....blender.interface.panel_parts import draw_operators, draw_properties, panel, sentence
 from ....blender.rendering.effect_source import FAULTS
 from ....core.model.choices import CONTEXT
-from ..part_tracking import SURE
+from ..tracking import SURE
 from . import follow_track, track_region
 
 # Seconds: work between two redraws, at least and at most; waiting for the tracking thread.

@@ -30,7 +30,7 @@ from ....core.model.effect import Camera, Region
 from ....core.model.frame_state import Options
 from ....core.model.keyframes import Samples
 from ....media.footage import Footage
-from .. import camera_tracking, matte_tracking, part_tracking, tracking
+from .. import camera_tracking, matte_tracking, tracking
 from ..tracking import Tracked
 
 
@@ -172,7 +172,7 @@ def confidence_at(effect: PropertyGroup, index: int | None, frame: float) -> flo
 def next_unsure(effect: PropertyGroup, index: int | None, frame: float) -> int | None:
     """Return the least confident frame of the next stretch of unsure frames, or None."""
     frames, confidence = MotionKeys(effect, index, "LOCATION").confidence()
-    unsure = (frames <= limits.MAX_FRAME) & (confidence < part_tracking.SURE)
+    unsure = (frames <= limits.MAX_FRAME) & (confidence < tracking.SURE)
     begins = np.flatnonzero(unsure & ~np.append(False, unsure[:-1]) & (frames > frame))
     if not len(begins):
         return None
@@ -188,7 +188,7 @@ def faults(effect: PropertyGroup, index: int | None) -> list[tuple[int, str, boo
 
 def lost(effect: PropertyGroup, index: int | None) -> tuple[int, str] | None:
     """Return the timeline frame where tracking lost the subject, and a note in the user's language, or None."""
-    frame = part_tracking.lost(*MotionKeys(effect, index, "LOCATION").confidence())
+    frame = tracking.lost(*MotionKeys(effect, index, "LOCATION").confidence())
     if frame is None:
         return None
     words = rpt_(
