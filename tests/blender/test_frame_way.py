@@ -8,7 +8,7 @@ import frame_trace
 import numpy as np
 from support import write_movie
 
-from shutter_addon.blender.editing import whole_edits
+from shutter_addon.blender.commands import render_command
 from shutter_addon.blender.rendering import sessions
 from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media import open_source
@@ -35,7 +35,7 @@ def ways(bpy, footage, frames, tmp_path):
 
     sessions.forget()
     with open_source(footage) as medium:
-        scene = whole_edits.make_edit(footage, medium, recipe_file.parse(json.dumps(RECIPE)), tmp_path)
+        scene = render_command.make_edit(footage, medium, recipe_file.parse(json.dumps(RECIPE)), tmp_path)
     scene.render.image_settings.file_format, scene.render.image_settings.color_depth = "PNG", "16"
     door = "VirtualShutterEngine.render"
     for frame in frames:
