@@ -229,7 +229,11 @@ def add_strip(scene: Scene, strip: Strip, film: baked_film.Film) -> Strip:
     fcurves.copy_curves(scene, alpha[0], scene, alpha[1])
     match_source.append_modifiers(scene, strip, baked)
     strip.mute = True
-    _note(strip, baked, film, home)
+    identity = uuid.uuid4().hex
+    for each in (strip, baked):
+        noted = each.virtual_shutter_bake
+        noted.identity, noted.version, noted.channel = identity, film.version, home
+        noted.first, noted.count = film.frames.start, len(film.frames)
     baked.color_tag = strip.color_tag
     add_effect.connect(scene, [baked, strip, *strip.connections])
     return baked
@@ -264,19 +268,6 @@ def _relative(path: Path) -> str:
     with suppress(ValueError):  # on another drive
         return bpy.path.relpath(str(path))
     return str(path)
-
-
-def _note(strip: Strip, baked: Strip, film: baked_film.Film, channel: int) -> None:
-    """Mark both strips as belonging to a bake, with the version of the effect.
-
-    Args:
-        channel: original channel of the effect strip.
-    """
-    identity = uuid.uuid4().hex
-    for each in (strip, baked):
-        bake = each.virtual_shutter_bake
-        bake.identity, bake.version = identity, film.version
-        bake.first, bake.count, bake.channel = film.frames.start, len(film.frames), channel
 
 
 def baked_of(scene: Scene, strip: Strip) -> list:
