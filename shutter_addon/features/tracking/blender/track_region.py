@@ -137,30 +137,22 @@ def _stops(effect: PropertyGroup, index: int | None) -> list[tuple[int, Property
     return [(round(frame), stop) for frame, stop in known if math.isfinite(frame)]
 
 
-def _track(effect: PropertyGroup, index: int | None) -> tuple[list[int], list[presence.Stop]]:
-    """Return the timeline frames with a track, and where it ended."""
-    frames, confidence = MotionKeys(effect, index, "LOCATION").confidence()
-    seen = np.round(frames[confidence > 0]).astype(int).tolist()
-    ends = [presence.Stop(at, stop.forward, stop.fault == tracking.SHOT_ENDS) for at, stop in _stops(effect, index)]
-    return seen, ends
-
-
 def key_ends(effect: PropertyGroup, index: int | None) -> None:
     """Key the influence where the track ends, or remove such keyframes. An outline needs none."""
-    keys, (seen, stops), fades = MotionKeys(effect, index, "SCALE"), _track(effect, index), []
+    keys, fades = MotionKeys(effect, index, "SCALE"), []
+    frames, confidence = keys.confidence()
+    seen = np.round(frames[confidence > 0]).astype(int).tolist()
+    ends = [presence.Stop(at, stop.forward, stop.fault == tracking.SHOT_ENDS) for at, stop in _stops(effect, index)]
     has_matte = index is not None and effect.regions[index].kind in strips.LAID
     if selection.moving(effect, index).track_ends and seen and not has_matte:
         if index is None:
-            fades = presence.keys(seen, stops, (), _reach(effect), beside=1)
+            # No exposure reaches frames with unknown motion.
+            window, position = validation.number(effect, "window"), validation.word(effect, "position").lower()
+            reach = max(Options(window=window, position=position).reach, presence.FADE)
+            fades = presence.keys(seen, ends, (), reach, beside=1)
         else:
-            fades = presence.keys(seen, stops, keys.edited(range(min(seen), max(seen) + 1)))
+            fades = presence.keys(seen, ends, keys.edited(range(min(seen), max(seen) + 1)))
     keys.fade(motion_keys.ENDS[index is None], fades)
-
-
-def _reach(effect: PropertyGroup) -> int:
-    """Return the frames of the camera's fade, so that no exposure reaches frames with unknown motion."""
-    window, position = validation.number(effect, "window"), validation.word(effect, "position").lower()
-    return max(Options(window=window, position=position).reach, presence.FADE)
 
 
 def confidence_at(effect: PropertyGroup, index: int | None, frame: float) -> float | None:
