@@ -56,7 +56,10 @@ def give_effect(context: Context) -> None:
     shutter_edits.start(effect)
     selection.choose(scene, strip)
     if not bpy.app.background:
-        show_panel(context)
+        for _window, area in preview_areas.previews(context):
+            area.spaces.active.show_region_ui = True
+        # A sidebar has no tabs before it is drawn. A slow window draws it late; one without room never does.
+        main_thread.later(partial(_choose_tab, iter([0.1] * 30)), 0.1)
     redraw(context)
 
 
@@ -117,15 +120,8 @@ def clean_trail(_self: Operator, context: Context, effect: PropertyGroup) -> Non
     shutter_edits.as_layer(effect, effect.active_region, "ANGLE_360", "STILL", bar_edits.auto_key(context))
 
 
-def show_panel(context: Context) -> None:
-    """Open the sidebar's Shutter tab in all previews."""
-    for _window, area in preview_areas.previews(context):
-        area.spaces.active.show_region_ui = True
-    # A sidebar has no tabs before it is drawn. A slow window draws it late; one without room never does.
-    main_thread.later(partial(_choose_tab, iter([0.1] * 30)), 0.1)
-
-
 def _choose_tab(waits: Iterator[float]) -> float | None:
+    """Open the sidebar's Shutter tab in all previews, as a timer."""
     areas = [area for _window, area in preview_areas.previews(bpy.context)]
     sidebars = [next(region for region in area.regions if region.type == "UI") for area in areas]
     drawn = [s for s in sidebars if not s.is_property_readonly("active_panel_category")]

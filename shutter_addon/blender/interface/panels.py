@@ -109,7 +109,9 @@ class SEQUENCER_PT_shutter(Panel):
             return
         effect = active[1]
         _draw_live(layout, context)
-        _draw_source(layout, effect)
+        shown = match_source.shown(effect)
+        words = iface_("Source: {strip}").format(strip=shown.source) if shown else iface_("Choose Source")
+        layout.operator_menu_enum("shutter.source", "strip", text=words, icon="SEQUENCE", translate=False)
         draw_list(layout, effect, "shutter", effect.shutters)
         row = layout.row(align=True)
         draw_operators(row, "draw")
@@ -191,13 +193,6 @@ def _draw_live(layout: UILayout, context: Context) -> None:
     notes.enabled = bool(found - {None})
     notes.alert = "ERROR" in found
     notes.popover("SHUTTER_PT_notes", text="", icon="ERROR" if notes.alert else "INFO")
-
-
-def _draw_source(layout: UILayout, effect: PropertyGroup) -> None:
-    """Draw the menu that chooses the source, named after the current one."""
-    shown = match_source.shown(effect)
-    words = iface_("Source: {strip}").format(strip=shown.source) if shown else iface_("Choose Source")
-    layout.operator_menu_enum("shutter.source", "strip", text=words, icon="SEQUENCE", translate=False)
 
 
 def _notes(context: Context) -> Iterator[tuple[str, str]]:

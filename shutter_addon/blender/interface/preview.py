@@ -121,7 +121,9 @@ def _draw() -> None:
         else:
             previews.looking.whole = None
             previews.looking.slices.end()
-            _tell_unseen(context, say)
+            active = selection.active(context)
+            if active is not None and context.space_data.show_overlays and not selection.seen(active[0]):
+                say(selection.why_unseen(active[0], active[2]))
         try:
             previews.refine()
         except effect_source.FAULTS as error:
@@ -156,21 +158,16 @@ def _show(context: Context, shown: Shown, decision: Decision | None, say: Say) -
         say(rpt_("Shutter: {fault}").format(fault=error))
 
 
-def _tell_unseen(context: Context, say: Say) -> None:
-    """Add a note why the active effect is not visible, if no other effect is."""
-    active = selection.active(context)
-    if active is None or selection.seen(active[0]) or not context.space_data.show_overlays:
-        return
-    say(selection.why_unseen(active[0], active[2]))
-
-
 def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, say: Say) -> None:
     settings, renderer, request = context.window_manager.virtual_shutter, wanted.renderer, wanted.request
     is_still = not context.screen.is_animation_playing
     if context.space_data.show_overlays:
         _tell_detail(wanted, annotations.picture_size(shown.effect), say)
-    if wanted.left > 0 or wanted.draws_result:
-        _warn(shown, say)
+    if wanted.left > 0 or wanted.draws_result:  # a picture drawn over the sequencer's cannot show all
+        if shown.strips_above:
+            say(rpt_("The strips above are hidden in this view"))
+        if shown.scene.view_settings.view_transform != "Standard":
+            say(rpt_("This view uses the view transform Standard"))
     if wanted.left > 0:
         _show_source(quad, shown, renderer, request, wanted.left)
     if wanted.draws_result:
@@ -193,14 +190,6 @@ def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, s
     decision = wanted.decision
     if context.space_data.show_overlays and is_still and not decision.is_plain and not previews.may_be_late():
         features.call("note_streaks", shown.effect, decision.snapshot, renderer, decision.request, say)
-
-
-def _warn(shown: Shown, say: Say) -> None:
-    """Add notes about what a picture drawn over the sequencer's cannot show."""
-    if shown.strips_above:
-        say(rpt_("The strips above are hidden in this view"))
-    if shown.scene.view_settings.view_transform != "Standard":
-        say(rpt_("This view uses the view transform Standard"))
 
 
 def _tell_detail(wanted: Drawing, size: tuple[int, int], say: Say) -> None:
