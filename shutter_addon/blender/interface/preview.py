@@ -259,17 +259,13 @@ def _show_shares(
 ) -> None:
     """Draw a picture of labels or coefficients in their colors."""
     (texture, block), source = drawn, renderer.source
-    textures = {"labels" if step == "SCRIBBLES" else "coefficients": texture, "palette": _palette(colors)}
+    rgba, size = np.ones((len(colors), 4), dtype=np.float32), (len(colors), 1)
+    rgba[:, :3] = colors
+    data = gpu.types.Buffer("FLOAT", rgba.size, rgba.reshape(-1))
+    side_by_side = gpu.types.GPUTexture(size, layers=1, format="RGBA32F", data=data)
+    palette = Texture(None, (*size, 1), "rgba32f", side_by_side)
+    textures = {"labels" if step == "SCRIBBLES" else "coefficients": texture, "palette": palette}
     quad.draw(step, textures, opacity=opacity, block=block, size=(source.width, source.height), **more)
-
-
-def _palette(palette: Colors) -> Texture:
-    """Return a texture of colors, side by side."""
-    colors = np.ones((len(palette), 4), dtype=np.float32)
-    colors[:, :3] = palette
-    size = len(colors), 1
-    data = gpu.types.Buffer("FLOAT", colors.size, colors.reshape(-1))
-    return Texture(None, (*size, 1), "rgba32f", gpu.types.GPUTexture(size, layers=1, format="RGBA32F", data=data))
 
 
 def draw_notes(region: Region, notes: list[str]) -> None:

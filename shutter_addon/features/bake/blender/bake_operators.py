@@ -183,8 +183,8 @@ def draw_panel(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Str
 def _draw_state(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
     if not baked_of(scene, strip):
         sentence(layout, iface_("The baked strip was deleted"), "ERROR")
-    elif (has_changed := known_stale(scene, effect, strip)) is None:
-        main_thread.later(_ask_whether_stale, STILL)  # not while drawing: it reads the whole effect
+    elif (has_changed := revision.known("bake", _place(scene, effect, strip))) is None:
+        main_thread.later(_ask_whether_stale, STILL)  # not while drawing: is_stale reads the whole effect
     elif has_changed:
         sentence(layout, iface_("The effect has changed since it was baked"), "ERROR")
     else:
@@ -288,11 +288,6 @@ def is_stale(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
     """Return whether the baked film is outdated or gone."""
     place = _place(scene, effect, strip)
     return revision.until_change("bake", place, lambda: effect_version.is_changed(scene, effect, strip))
-
-
-def known_stale(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool | None:
-    """Return `is_stale` if it was called since the last change; None: it was not."""
-    return revision.known("bake", _place(scene, effect, strip))
 
 
 def _place(scene: Scene, effect: PropertyGroup, strip: Strip) -> tuple:
