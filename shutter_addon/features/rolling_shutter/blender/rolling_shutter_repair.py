@@ -117,34 +117,6 @@ def repair(scene: Scene, effect: PropertyGroup, strip: Strip, share: float, side
     effect.active_region = list(effect.regions).index(region)
 
 
-def find(scene: Scene, effect: PropertyGroup, strip: Strip, *, columns: bool) -> tuple[float, str]:
-    """Find the readout of a source around the current frame, and the side that is read first.
-
-    Args:
-        columns: whether the sensor reads column by column.
-
-    Raises:
-        EffectError: there is none, or it cannot be found.
-        MediaError: the footage cannot be read.
-    """
-    frame = scene.frame_current
-    index = snapshot.source_frames(scene, effect, strip, (frame,))[frame]
-    with ShotSource(source_media.open_media(strips.source_of(scene, effect, strip))) as medium:
-        half = readout.FRAMES // 2
-        low, high = max(index - half, 0), min(index + half, medium.count)
-        shot = medium.around(index, low, high - 1)
-        frames = range(max(low, shot.start), min(high, shot.stop))
-        try:
-            found = readout.of_source(medium, frames, columns=columns)
-        except readout.ReadoutError as error:
-            sentence = rpt_("the readout cannot be found here: {why}")
-            raise EffectError(sentence.format(why=rpt_(str(error)))) from None
-    if abs(found) < LEAST:
-        raise EffectError(rpt_("moving lines stay upright: there is no rolling shutter to repair"))
-    sides = ("LEFT", "RIGHT") if columns else ("TOP", "BOTTOM")
-    return found, sides[found < 0]
-
-
 def _why_no_repair(effect: PropertyGroup) -> str | None:
     try:
         has_repair = of(effect) is not None
@@ -188,8 +160,23 @@ def rolling_shutter(self: Operator, _context: Context, effect: PropertyGroup) ->
 @operator("Find Readout", _why_no_repair, icon="VIEWZOOM", reads=_READS)
 def find_readout(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Find the sensor's readout time from lines that lean while they move around the current frame, and repair it"""
-    found, side = find(self.edit, effect, self.effect_strip, columns=self.reads == "COLUMNS")
-    repair(self.edit, effect, self.effect_strip, min(abs(found), 1.0), side)
+    scene, strip, columns = self.edit, self.effect_strip, self.reads == "COLUMNS"
+    frame = scene.frame_current
+    index = snapshot.source_frames(scene, effect, strip, (frame,))[frame]
+    with ShotSource(source_media.open_media(strips.source_of(scene, effect, strip))) as medium:
+        half = readout.FRAMES // 2
+        low, high = max(index - half, 0), min(index + half, medium.count)
+        shot = medium.around(index, low, high - 1)
+        frames = range(max(low, shot.start), min(high, shot.stop))
+        try:
+            found = readout.of_source(medium, frames, columns=columns)
+        except readout.ReadoutError as error:
+            sentence = rpt_("the readout cannot be found here: {why}")
+            raise EffectError(sentence.format(why=rpt_(str(error)))) from None
+    if abs(found) < LEAST:
+        raise EffectError(rpt_("moving lines stay upright: there is no rolling shutter to repair"))
+    side = (("LEFT", "RIGHT") if columns else ("TOP", "BOTTOM"))[found < 0]
+    repair(scene, effect, strip, min(abs(found), 1.0), side)
     name = next(name for word, name, _ in SIDES if word == side)
     percent = round(100 * abs(found))
     sentence = rpt_("Readout of {percent} % of a frame, read first: {side}")
