@@ -34,7 +34,7 @@ def opened():
 
 def note():
     """How far it goes from one frame of the exposure to the next, in pixels."""
-    return driver.part("blender.rendering.strobing").last(story.effect())
+    return driver.part("features.smooth.blender.strobing").last(story.effect())
 
 
 def pointed_at():

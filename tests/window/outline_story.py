@@ -40,7 +40,7 @@ def outlined():
 
 def carried():
     """A straight outline stands in until it is."""
-    carrying = part("blender.rendering.outline_carrying")
+    carrying = part("features.outlines.blender.outline_carrying")
     driver.edit().frame_set(FRAME)
     yield from driver.until(lambda: carrying.progress() is not None, "it is carried", 20, wait=0.02)
     yield from driver.until(lambda: carrying.progress() is None, "it is there", 60)
@@ -55,12 +55,12 @@ def carried():
 
 def mended():
     """The carried curve is pulled up at her head, and let go again by Esc; then that is undone."""
-    drawings, gizmo = part("blender.editing.outline_drawings"), part("blender.interface.outline_operators")
+    operators = part("features.outlines.blender.outline_operators")
     before = shapes()
     with driver.override("PREVIEW"):
         scene, effect, strip = part("blender.data.selection").active(bpy.context)
-        curves = drawings.shown_curves(scene, effect, strip, effect.active_region)
-        assert gizmo.SHUTTER_GGT_outline.poll(bpy.context)
+        curves = operators.shown_curves(scene, effect, strip, effect.active_region)
+        assert operators.SHUTTER_GGT_outline.poll(bpy.context)
     x, y = on_preview(*max(curves[0], key=lambda point: point[1]))
     yield from driver.drag(story.preview(), [(x, y), (x, y + 6), (x, y + 12), (x, y + 25)])
     yield from driver.until(lambda: FRAME in shapes(), "its frame is a drawing")
@@ -89,7 +89,7 @@ def shapes():
 
 def needed():
     """Next Drawing Needed carries what is lacking, and goes where both sides agree least, if they do not agree."""
-    carrying = part("blender.rendering.outline_carrying")
+    carrying = part("features.outlines.blender.outline_carrying")
     with driver.override("PREVIEW"):
         bpy.ops.shutter.outline_needed("INVOKE_DEFAULT")
     yield from driver.until(lambda: not is_carrying() and carrying.progress() is None, "all is carried", 90)

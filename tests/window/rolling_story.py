@@ -39,7 +39,7 @@ def opened():
 
 def readout():
     """In per cent, by the ramp; 0: there is none."""
-    repair = driver.part("blender.editing.rolling_shutter")
+    repair = driver.part("features.rolling_shutter.blender.rolling_shutter_repair")
     known = repair.of(story.effect())
     return known and round(100 * known.readout, 1)
 

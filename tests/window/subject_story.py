@@ -28,13 +28,14 @@ def region():
 
 
 def is_carrying():
-    return part("blender.rendering.outline_carrying").progress() is not None
+    return part("features.outlines.blender.outline_carrying").progress() is not None
 
 
 def curves():
     with driver.override("PREVIEW"):
         scene, effect, strip = part("blender.data.selection").active(bpy.context)
-        return part("blender.editing.outline_drawings").shown_curves(scene, effect, strip, effect.active_region)
+        operators = part("features.outlines.blender.outline_operators")
+        return operators.shown_curves(scene, effect, strip, effect.active_region)
 
 
 def stroke_drawn():
