@@ -13,7 +13,7 @@ from support import write_frames
 from shutter_addon.blender.data import matte_content, recipe_import, strips
 from shutter_addon.blender.editing import add_effect
 from shutter_addon.core.recipes import recipe_file
-from shutter_addon.features.bake.blender import baked_film, baked_strips
+from shutter_addon.features.bake.blender import bake_operators, baked_film
 from shutter_addon.media.image_writing import write_exr
 
 WIDTH, HEIGHT, COUNT = 64, 36, 12
@@ -150,7 +150,7 @@ def _bake(scene: Any, strip: Any) -> None:
     strip.left_handle += 1
     film = baked_film.film_of(scene, effect, strip, "OPEN_EXR")
     baked_film.render(scene, effect, strip, film, lambda _count: None)
-    baked_strips.add_strip(scene, strip, film)
+    bake_operators.add_strip(scene, strip, film)
 
 
 def _add_other_regions(scene: Any, effect: Any, footage: Path) -> None:

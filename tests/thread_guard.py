@@ -17,7 +17,7 @@ _PACKAGE = "shutter_addon"
 _OURS = "Virtual Shutter"  # how the names of our threads begin
 _DATA = (bpy.types.bpy_struct, bpy.types.bpy_prop_collection, bpy.types.bpy_prop_array)
 _MODULES = "bpy", "_bpy", "gpu", "bl_math", "mathutils"
-# By files below blender/: what runs on our threads, and touches no bpy data.
+# By files below blender/, that of a feature as well: what runs on our threads, and touches no bpy data.
 REVIEWED: dict[str, set[str]] = {
     "data/source_media.py": {"SourceSpec.open"},
     "data/versions.py": {"_digest"},
@@ -30,14 +30,14 @@ REVIEWED: dict[str, set[str]] = {
         *(f"RelayedDevice.{name}" for name in ("__init__", "_dispatch", "_free", "_make", "_read", "_send")),
         *("RelayedDevice.current", "RelayedDevice._wait_for", "RelayedDevice.release", "_called", "ask", "soon"),
     },
-    "editing/track_region.py": {"_each", "track.<lambda>"},
-    "rendering/outline_carrying.py": {"_Carrying._carry"},
+    "track_region.py": {"_each", "track.<lambda>"},
+    "outline_carrying.py": {"_Carrying._carry"},
     "rendering/effect_source.py": {"_options", "find_steps", "find_steps.find", "steps_key"},
     "rendering/pictures.py": {"_weights"},
     "rendering/render_job.py": {"where"},
     "rendering/session.py": {"RenderSession._ask", "RenderSession.forget.<lambda>", "broken_off"},
     "rendering/sessions.py": {"_ask_window"},
-    "rendering/strobing.py": {"_measure_motion"},
+    "strobing.py": {"_measure_motion"},
 }
 
 seen: set[str] = set()  # functions that were called on our threads
@@ -76,8 +76,8 @@ def _started(code, _offset):
         sys.monitoring.set_local_events(_TOOL, code, _EVENTS.PY_RETURN | _EVENTS.CALL)
         name = code.co_qualname.replace(".<locals>", "")
         seen.add(f"{path}: {name}")
-        room, _, file = path.partition("/")
-        if _reviewed_alone and room == "blender" and name not in REVIEWED.get(file, ()):
+        _feature, room, file = f"/{path}".rpartition("/blender/")
+        if _reviewed_alone and room and name not in REVIEWED.get(file, ()):
             _faults[f"{path}: {name} runs on a thread"] = None
         _look(code, sys._getframe(1).f_locals)
     return None

@@ -38,6 +38,12 @@ def each(name: str) -> Iterator[Any]:
     return (getattr(module, name) for module in modules() if hasattr(module, name))
 
 
+def call(name: str, *arguments: Any) -> None:
+    """Call the functions of all features that have this name."""
+    for function in each(name):
+        function(*arguments)
+
+
 def needed(name: str) -> Any:
     """Return what a feature calls `name`. EffectError: the feature was removed."""
     for found in each(name):

@@ -12,7 +12,7 @@ from shutter_addon import blender
 from shutter_addon.core.model import effect, scribbles, shutters
 from shutter_addon.core.model.choices import CONTEXT
 from shutter_addon.features.rolling_shutter import readout
-from shutter_addon.features.tracking import camera_tracking, matte_tracking, part_tracking, tracking
+from shutter_addon.features.tracking import camera_tracking, matte_tracking, tracking
 
 ROOT = Path(blender.__file__).parents[1]
 SOURCES = sorted([*ROOT.glob("blender/**/*.py"), *ROOT.glob("features/*/blender/*.py")])
@@ -42,7 +42,7 @@ def of_core() -> set:
 def of_media() -> set:
     """Sentences of media that say why nothing can be tracked or found, which editing passes on in the user's
     language."""
-    modules = tracking, camera_tracking, part_tracking, matte_tracking, readout
+    modules = tracking, camera_tracking, matte_tracking, readout
     named = [each for module in modules for each in vars(module).items()]
     return {("*", words) for name, words in named if name.isupper() and isinstance(words, str)}
 

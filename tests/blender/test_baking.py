@@ -14,7 +14,7 @@ from shutter_addon.blender.editing import reconcile
 from shutter_addon.blender.output import film_output
 from shutter_addon.core import revision
 from shutter_addon.core.frames import light
-from shutter_addon.features.bake.blender import baked_film, baked_strips
+from shutter_addon.features.bake.blender import bake_operators, baked_film
 from shutter_addon.media import film_parts
 
 COUNT, SIZE = 9, (24, 40)
@@ -107,8 +107,8 @@ def test_unbake_brings_the_effect_back(bpy, film):
 
 def states(scene, strip):
     revision.changed()
-    parts = baked_strips.effect_parts(scene, strip)
-    return [baked_strips.is_stale(scene, strips.effect_of(scene, part.scene), part) for part in parts]
+    parts = bake_operators.effect_parts(scene, strip)
+    return [bake_operators.is_stale(scene, strips.effect_of(scene, part.scene), part) for part in parts]
 
 
 def test_it_says_that_it_is_stale(bpy, film):

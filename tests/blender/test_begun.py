@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from support import noise, noise_film, picture_of, recipe, write_movie
 
+from shutter_addon.blender.commands import render_command
 from shutter_addon.blender.data import snapshot
 from shutter_addon.blender.devices import available
-from shutter_addon.blender.editing import whole_edits
 from shutter_addon.blender.rendering import effect_source, job_snapshots, session, sessions
 from shutter_addon.blender.rendering.session import RenderContext
 from shutter_addon.compute.renderer import Renderer
@@ -182,7 +182,7 @@ def ways(bpy, footage, frames, tmp_path):
 
     sessions.forget()
     with open_source(footage) as medium:
-        scene = whole_edits.make_edit(footage, medium, recipe_file.parse(json.dumps(RECIPE)), tmp_path)
+        scene = render_command.make_edit(footage, medium, recipe_file.parse(json.dumps(RECIPE)), tmp_path)
     scene.render.image_settings.file_format, scene.render.image_settings.color_depth = "PNG", "16"
     door = "VirtualShutterEngine.render"
     for frame in frames:

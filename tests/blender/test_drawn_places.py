@@ -5,7 +5,7 @@ import pytest
 from support import write_frames
 
 from shutter_addon.blender.data import annotations, selection, snapshot
-from shutter_addon.blender.editing import drawn_places, motion_keys, region_edits
+from shutter_addon.blender.editing import motion_keys, region_edits
 from shutter_addon.core.model import scribbles
 from shutter_addon.core.model.motions import Placement
 
@@ -32,7 +32,7 @@ def pen(bpy, frame, points, *, by_draw=True):
     bpy.context.scene.frame_set(frame)
     _scene, effect, strip = selection.active(bpy.context)
     if by_draw:
-        drawn_places.begin(effect, strip, 0)
+        region_edits.begin_drawing(effect, strip, 0)
     layer = annotations.layer_of(effect, effect.regions[0])
     there = {drawing.frame_number: drawing for drawing in layer.frames}
     annotations.add_stroke(there.get(frame) or layer.frames.new(frame), points)
@@ -42,7 +42,7 @@ def move(bpy, frame, placed):
     """As a handle is dragged."""
     bpy.context.scene.frame_set(frame)
     effect = selection.active(bpy.context)[1]
-    drawn_places.hold(effect, 0)
+    region_edits.hold_drawings(effect, 0)
     region = effect.regions[0]
     region.location, region.rotation, region.scale = placed.location, np.radians(placed.rotation), placed.scale
     motion_keys.insert(effect, 0)
@@ -90,12 +90,12 @@ def test_the_eraser_finds_what_is_seen(bpy, region):
     scene, effect, strip = selection.active(bpy.context)
     layer = annotations.layer_of(effect, region)
     scene.frame_set(6)
-    drawn_places.begin(effect, strip, 0, erases=True)
+    region_edits.begin_drawing(effect, strip, 0, erases=True)
     assert [drawing.frame_number for drawing in layer.frames] == [1]
     move(bpy, 1, Placement())
     move(bpy, 11, MOVES["all"])
     before = seen(bpy, 11)
-    drawn_places.begin(effect, strip, 0, erases=True)
+    region_edits.begin_drawing(effect, strip, 0, erases=True)
     stored = {drawing.frame_number: annotations.strokes_of(drawing) for drawing in layer.frames}
     assert stored.keys() == {1, 11}
     assert same(stored[11], *before)
@@ -133,7 +133,7 @@ def test_outlines_stay_as_they_are_drawn(bpy, region):
     region.kind = "OUTLINE"
     move(bpy, 11, MOVES["shifted"])
     scene, effect, strip = selection.active(bpy.context)
-    drawn_places.begin(effect, strip, 0)
+    region_edits.begin_drawing(effect, strip, 0)
     strokes = snapshot.strokes_at(scene, effect, strip, 0, 11)
     assert same(in_pixels(strokes), FIRST)
     region_edits.draw_curves(effect, strip, region, strokes, 11)

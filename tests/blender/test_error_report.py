@@ -190,7 +190,8 @@ def test_the_command(tmp_path, capsys):
 def test_no_operator_reports_an_error_past_the_report():
     """All go through operator_bases.report."""
     found = []
-    for path in (ROOT / "shutter_addon" / "blender" / "interface").glob("*.py"):
+    package = ROOT / "shutter_addon"
+    for path in [*package.glob("blender/interface/*.py"), *package.glob("features/*/blender/*.py")]:
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "report":
                 kinds = {each.value for each in ast.walk(node.args[0]) if isinstance(each, ast.Constant)}

@@ -17,11 +17,6 @@ KEPT = "shutter_addon", "shaders", "tests", "models", "pyproject.toml", "blender
 CORE = "test_editing", "test_snapshot", "test_effects", "test_timing"
 
 
-def test_all_folders_are_named():
-    folders = {path.name for path in (ROOT / "shutter_addon" / "features").glob("*/") if path.name != "__pycache__"}
-    assert folders == set(FEATURES)
-
-
 @pytest.mark.parametrize("feature", FEATURES)
 def test_the_core_works_without_it(tmp_path, feature):
     for name in KEPT:

@@ -10,7 +10,7 @@ from support import write_frames
 
 from shutter_addon.blender.data import struct_dna
 from shutter_addon.core.messages import EffectError
-from shutter_addon.features.masks.blender import mask_reading
+from shutter_addon.features.masks.blender import blender_masks
 
 AVERAGE = 0.5  # what a picture may differ by, in 8-bit levels: Blender cuts off fractions
 ASTRAY = 0.001  # share of pixels that may differ by more than 8 levels
@@ -34,7 +34,7 @@ def assert_as_the_strip(bpy, edit, render):
         edit.sequence_editor.strips.new_mask("mask", mask, 1, 1)
         shown = render(edit, frames)
         edit.frame_set(77)
-        shapes = mask_reading.at_frames(mask, [mask.frame_start + f - 1 for f in frames])
+        shapes = blender_masks.at_frames(mask, [mask.frame_start + f - 1 for f in frames])
         found = [255 * shape.values(*size) for shape in shapes]
         assert edit.frame_current == 77
         differences = np.abs(np.array(found) - [shown[f][..., 0] for f in frames])
@@ -182,14 +182,14 @@ def moving(bpy, edit, mask, mask_editor, clip):
 
 def assert_refused(mask):
     with pytest.raises(EffectError, match='mask "M" moves: use "Outline from Mask", or take a film'):
-        mask_reading.still_mask(mask)
+        blender_masks.still_mask(mask)
 
 
 def test_shape_keys_are_read_and_refused(moving, monkeypatch):
     """Reading leaves the mask as it is. Another Blender may have shape keys elsewhere."""
     spline = moving.layers["L"].splines[0]
     stood = [tuple(point.co) for point in spline.points]
-    first, last, beyond = mask_reading.at_frames(moving, (5, 30, 100))
+    first, last, beyond = blender_masks.at_frames(moving, (5, 30, 100))
     assert [tuple(point.co) for point in spline.points] == stood
     assert last == beyond != first
     assert_refused(moving)
@@ -197,18 +197,18 @@ def test_shape_keys_are_read_and_refused(moving, monkeypatch):
     def elsewhere(*_):
         raise struct_dna.LayoutError
 
-    monkeypatch.setattr(mask_reading, "record", elsewhere)
-    assert mask_reading.still_mask(moving).layers[0].splines[0].points[0][1][0] == pytest.approx(0.6)
+    monkeypatch.setattr(blender_masks, "record", elsewhere)
+    assert blender_masks.still_mask(moving).layers[0].splines[0].points[0][1][0] == pytest.approx(0.6)
 
 
 def test_keyed_opacity_and_parents_are_refused(bpy, mask, mask_editor, clip, edit):
     layer = mask.layers.new(name="L")
     spline, clip = draw(layer, blob(random.Random(2), 5)), clip(40, 30)
-    mask_reading.still_mask(mask)
+    blender_masks.still_mask(mask)
     layer.keyframe_insert("alpha", frame=10)
     assert_refused(mask)
     layer.keyframe_delete("alpha", frame=10)
-    mask_reading.still_mask(mask)
+    blender_masks.still_mask(mask)
     clip.tracking.tracks.active = clip.tracking.tracks.new(name="T", frame=1)
     with mask_editor(clip, mask):
         for point in spline.points:
@@ -223,8 +223,8 @@ def test_numbers_that_are_none_are_refused(bpy, mask, value):
     spline = draw(layer, blob(random.Random(2), 5))
     spline.points[2].co = (value, 0.5)
     with pytest.raises(EffectError, match='mask "M": a point, a feather or an opacity is not a usable number'):
-        mask_reading.still_mask(mask)
+        blender_masks.still_mask(mask)
     spline.points[2].co = (0.5, 0.5)
     layer.alpha = value
     with pytest.raises(EffectError, match="not a usable number"):
-        mask_reading.still_mask(mask)
+        blender_masks.still_mask(mask)

@@ -7,10 +7,10 @@ from support import effect_of, image_strip, recipe, request, write_frames
 
 from shutter_addon.blender.data import selection, snapshot
 from shutter_addon.blender.editing import region_edits
-from shutter_addon.blender.rendering import sessions
+from shutter_addon.blender.rendering import previews, sessions
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import outlines
-from shutter_addon.features.outlines.blender import outline_carrying, outline_drawings
+from shutter_addon.features.outlines.blender import outline_carrying, outline_operators
 from shutter_addon.features.outlines.carried_mattes import CarriedMattes
 from shutter_addon.features.outlines.subject_mattes import CarriedFile
 
@@ -130,10 +130,10 @@ def test_what_is_carried_becomes_a_drawing(bpy, chosen, between):
     expected = coefficients(strip, effect, 6)
     assert bpy.ops.shutter.outline_draw() == {"FINISHED"}
     assert drawn_at(effect) == [1, 6, 9]
-    found = outline_drawings.curves_now(scene, effect, strip, 0)
+    found = outline_operators.curves_now(scene, effect, strip, 0)
     assert np.abs(outlines.coverage(found, WIDTH, HEIGHT) - expected).mean() < 0.01
     assert bpy.ops.shutter.outline_draw() == {"FINISHED"}
-    assert outline_drawings.curves_now(scene, effect, strip, 0) == found
+    assert outline_operators.curves_now(scene, effect, strip, 0) == found
 
 
 def test_the_next_drawing_needed(bpy, chosen):
@@ -143,11 +143,11 @@ def test_the_next_drawing_needed(bpy, chosen):
     assert bpy.ops.shutter.outline_needed() == {"CANCELLED"}
     scene = strip.id_data
     scene.frame_set(9)
-    wrong = [[(x + 0.12, y) for x, y in each] for each in outline_drawings.curves_now(scene, effect, strip, 0)]
+    wrong = [[(x + 0.12, y) for x, y in each] for each in outline_operators.curves_now(scene, effect, strip, 0)]
     region_edits.draw_curves(effect, strip, effect.regions[0], wrong, 9)
     scene.frame_set(1)
     assert bpy.ops.shutter.outline_needed() == {"FINISHED"}
-    frame, confidence = outline_drawings.next_needed(scene, effect, strip, 0)
+    frame, confidence = outline_operators.next_needed(scene, effect, strip, 0)
     assert scene.frame_current == frame in (6, 7, 8)
     assert confidence < 0.75
     effect.regions[0].between = "STRAIGHT"
@@ -160,9 +160,9 @@ def test_one_drawing_says_where_the_next_is_needed(bpy, chosen, monkeypatch):
     assert bpy.ops.shutter.outline_needed() in ({"FINISHED"}, {"CANCELLED"})
     sure = [1.0, 0.9, 0.9, 0.7, 0.7, 0.6, 0.4, 0.2, 0.0, 0.0, 0.0, None]
     monkeypatch.setattr(CarriedMattes, "confidence", lambda _self, number: sure[number])
-    assert outline_drawings.next_needed(strip.id_data, effect, strip, 0) == (11, 0.0)
+    assert outline_operators.next_needed(strip.id_data, effect, strip, 0) == (11, 0.0)
     sure[6:] = [0.9] * 6
-    assert outline_drawings.next_needed(strip.id_data, effect, strip, 0) == (6, 0.6)
+    assert outline_operators.next_needed(strip.id_data, effect, strip, 0) == (6, 0.6)
 
 
 @pytest.mark.parametrize(("frames", "fields"), [((1,), {}), ((1, 9), {}), ((1, 9), {"between": "straight"})])
@@ -202,7 +202,7 @@ def test_outline_it(bpy, edited, kind, strokes):
     assert effect.regions[0].kind == "OUTLINE"
     assert effect.regions[0].motion == ("SCALE" if kind == "outline" else "LOCATION")
     assert 5 in drawn_at(effect)
-    found = outlines.coverage(outline_drawings.curves_now(strip.id_data, effect, strip, 0), WIDTH, HEIGHT) > 0.5
+    found = outlines.coverage(outline_operators.curves_now(strip.id_data, effect, strip, 0), WIDTH, HEIGHT) > 0.5
     expected = covered(4) > 0.5
     assert np.count_nonzero(found & expected) > 0.9 * np.count_nonzero(found | expected)
 
@@ -262,16 +262,18 @@ def test_from_a_mask(bpy, chosen, moving_mask):
         assert np.abs(coefficients(strip, effect, frame) - covered(frame - 1)).mean() < 0.015, frame
 
 
-def test_what_fails_beside_blender_is_told_once(bpy):
+def test_what_fails_beside_blender_is_told_once(bpy, monkeypatch):
     """Whatever it is: else the file would be asked for with every look at the preview."""
-    file, arrived = CarriedFile(footage=Unreadable(), drawings=((0, outlines.curves(square(0))),)), []
-    outline_carrying.carry(file, [0], lambda: arrived.append(True))
+    file, arrived, said = CarriedFile(footage=Unreadable(), drawings=((0, outlines.curves(square(0))),)), [], []
+    monkeypatch.setattr(previews, "show_carried", lambda: arrived.append(True))
+    outline_carrying.carry(file, [0])
     outline_carrying._mattes.carrying.future.exception()  # waits for the thread
     assert outline_carrying._look() is None  # the timer, which no Blender without a window calls
     assert arrived == [True]
     assert outline_carrying.failure(file) == "internal error: RuntimeError('of a library')"
     outline_carrying.want_matte(file, 0)
-    assert outline_carrying.begin(lambda: None) == outline_carrying.failure(file)
+    outline_carrying.note_tracking(said.append)
+    assert said == [f"Shutter: {outline_carrying.failure(file)}"]
     assert outline_carrying.progress() is None
     outline_carrying.forget_pictures()
 

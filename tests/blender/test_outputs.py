@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from support import read_picture, recipe, refused, write_frames
 
-from shutter_addon.blender.editing import whole_edits
+from shutter_addon.blender.commands import render_command
 from shutter_addon.media import open_source
 from shutter_addon.media.rendered_pictures import whole_pictures
 
@@ -191,5 +191,5 @@ def test_whatever_goes_wrong_is_one_sentence(render, frames, tmp_path, monkeypat
     def make_edit(*_arguments):
         raise fault
 
-    monkeypatch.setattr(whole_edits, "make_edit", make_edit)
+    monkeypatch.setattr(render_command, "make_edit", make_edit)
     refused(render(frames, "--output", tmp_path / "out"), words)

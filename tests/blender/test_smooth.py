@@ -252,13 +252,13 @@ def test_a_still_preview_is_plain_until_its_moments_are_there(film, add, edit, b
     for _ in range(5):
         request = asked()
         assert request.state.options.step == 1
-        assert smooth_previews.is_busy()
+        assert smooth_previews.smooth_comes(taken.scene)
         same(request, plain)
     gate.set()
     until = time.monotonic() + 20
     while (request := asked()).state.options.step == 1:
         assert time.monotonic() < until
-    assert not smooth_previews.is_busy()
+    assert not smooth_previews.smooth_comes(taken.scene)
     same(request, shown(frames, around(4, bars), bars))
     both = drawing.request(taken, 2, effect_source.Detail(smooth=False)), request
     renderers = [drawing.renderer(each) for each in both]

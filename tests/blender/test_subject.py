@@ -12,7 +12,7 @@ from shutter_addon.blender.editing import region_edits
 from shutter_addon.blender.output import matte_export
 from shutter_addon.blender.rendering import sessions
 from shutter_addon.core.recipes import recipe_file
-from shutter_addon.features.outlines.blender import outline_carrying, outline_drawings
+from shutter_addon.features.outlines.blender import outline_carrying, outline_operators
 
 WIDTH, HEIGHT, COUNT, RADIUS = 192, 128, 6, 28
 STROKE = [[0.3, 0.45], [0.34, 0.5], [0.3, 0.55]]
@@ -73,7 +73,7 @@ def test_one_stroke(bpy, edited):
     assert effect.regions[0].kind == "SUBJECT"
     for frame in (1, 4, 6):
         assert overlap(coefficients(strip, effect, frame), frame - 1) > 0.9, frame
-    (curve,) = outline_drawings.curves_now(strip.id_data, effect, strip, 0)
+    (curve,) = outline_operators.curves_now(strip.id_data, effect, strip, 0)
     assert np.abs(np.mean(curve, axis=0) - (60 / WIDTH, 0.5)).max() < 0.02
     assert bpy.ops.shutter.subject_scribble() == {"FINISHED"}
     assert (effect.regions[0].kind, len(snapshot.strokes_at(strip.id_data, effect, strip, 0, 1))) == ("LINE", 1)
@@ -155,12 +155,12 @@ def test_the_least_sure_frame(bpy, edited, monkeypatch):
     what they cover."""
     strip, effect = edited()
     bpy.ops.shutter.outline_needed()
-    file, shown = outline_drawings.carried_frames(strip.id_data, effect, strip, 0)
+    file, shown = outline_operators.carried_frames(strip.id_data, effect, strip, 0)
     mattes = file.open()
     sure = {frame: mattes.confidence(number) for frame, number in shown.items()}
     mattes.close()
     assert None not in sure.values()
-    monkeypatch.setattr(outline_drawings, "SURE_SUBJECT", 1.1)
+    monkeypatch.setattr(outline_operators, "SURE_SUBJECT", 1.1)
     assert bpy.ops.shutter.track_look() == {"FINISHED"}
     assert sure[strip.id_data.frame_current] == min(sure.values())
     strip.id_data.frame_set(1)

@@ -13,7 +13,7 @@ from support import recipe, write_frames
 
 from shutter_addon.core.model import motions
 from shutter_addon.core.recipes import recipe_file
-from shutter_addon.features.tracking import camera_tracking, part_tracking, tracking
+from shutter_addon.features.tracking import camera_tracking, tracking
 
 ROOT = Path(__file__).parents[2]
 WIDTH, HEIGHT, COUNT = 160, 120, 12
@@ -71,7 +71,7 @@ def test_the_recipe_gets_the_keys_that_the_motion_needs(track, film, tmp_path):
         assert (key.rotation, key.scale) == (pytest.approx(0, abs=0.3), pytest.approx(1, abs=0.005))
     told = json.loads(report.read_text())
     assert [each["frame"] for each in told["frames"]] == list(range(1, COUNT + 1))
-    assert all(each["confidence"] > part_tracking.SURE for each in told["frames"])
+    assert all(each["confidence"] > tracking.SURE for each in told["frames"])
     assert told["stops"] == []
     before, after = said(tmp_path / "recipe.json"), said(output)
     assert (after.shutters, after.regions[0]) == (before.shutters, before.regions[0])

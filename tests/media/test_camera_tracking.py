@@ -12,7 +12,7 @@ from shutter_addon.core.model import motions
 from shutter_addon.core.model.effect import STILL_CAMERA, Drawings, Moves, Region
 from shutter_addon.core.model.keyframes import Constant, Keys
 from shutter_addon.core.model.motions import Similarity
-from shutter_addon.features.tracking import camera_tracking, part_tracking, tracking
+from shutter_addon.features.tracking import camera_tracking, tracking
 from shutter_addon.media import open_source
 from shutter_addon.media.footage import Footage
 
@@ -88,7 +88,7 @@ def test_a_shaken_camera_is_found_behind_a_subject_that_covers_most_of_it():
     found, faults = tracked(source, [lasso(16)], start=6)
     assert (faults, found.keys()) == ({}, set(range(16)))
     assert max(error(found, truth, 6, frame) for frame in found) < 1
-    assert min(each.confidence for each in found.values()) > part_tracking.SURE
+    assert min(each.confidence for each in found.values()) > tracking.SURE
     mistaken, _ = tracked(source, start=6)
     assert max(error(mistaken, truth, 6, frame) for frame in mistaken) > 10
 
@@ -147,6 +147,6 @@ def test_near_and_far_that_move_differently_are_not_sure(share):
     for n, frame in enumerate(source.frames):
         source.frames[n] = cv2.remap(frame, x + 3 * n * depth, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT)
     found, _ = tracked(source)
-    assert [n for n in found if n > 8 and found[n].confidence >= part_tracking.SURE] == []
+    assert [n for n in found if n > 8 and found[n].confidence >= tracking.SURE] == []
     frames = sorted(found)
-    assert part_tracking.lost(np.array(frames), np.array([found[n].confidence for n in frames])) <= 8
+    assert tracking.lost(np.array(frames), np.array([found[n].confidence for n in frames])) <= 8

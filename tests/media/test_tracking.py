@@ -12,7 +12,7 @@ from shutter_addon.core.model import scribbles
 from shutter_addon.core.model.effect import Drawings, Moves, Region
 from shutter_addon.core.model.keyframes import Constant, Keys
 from shutter_addon.core.model.motions import Similarity
-from shutter_addon.features.tracking import part_tracking, tracking
+from shutter_addon.features.tracking import tracking
 from shutter_addon.media import open_source
 from shutter_addon.media.footage import Footage
 
@@ -131,7 +131,7 @@ def errors(tracked, truth, kind):
 
 
 def sure(tracked):
-    return {frame for frame, each in tracked.items() if each.confidence > part_tracking.SURE}
+    return {frame for frame, each in tracked.items() if each.confidence > tracking.SURE}
 
 
 def shake(t):
@@ -176,7 +176,7 @@ def test_a_subject_that_stays_covered_ends_it(subject, ground, monkeypatch):
     monkeypatch.setattr(tracking, "PATIENCE", 6)
     source, truth = film(subject, ground, lambda t: (2.0 * t,), 16, 2, covered=range(8, 16))
     tracked, faults = followed(source, "lasso", 2)
-    assert faults == {8: part_tracking.COVERED}
+    assert faults == {8: tracking.COVERED}
     assert sorted(tracked) == list(range(8))
     assert max(errors(tracked, truth, "lasso").values()) <= 1
 
@@ -193,7 +193,7 @@ def test_a_subject_that_leaves_the_picture_and_comes_back(subject, ground):
     assert {0, 5, 28, 29} <= sure(tracked)
     assert 14 not in sure(tracked)
     tracked, faults = followed(source, "line", 2, range(14))
-    assert list(faults.values()) == [part_tracking.LEFT]
+    assert list(faults.values()) == [tracking.LEFT]
 
 
 def test_a_subject_without_corners_is_never_sure(subject, ground):
@@ -241,7 +241,7 @@ def test_a_jump_onto_a_lookalike_is_told(ground):
     assert not wrong & sure(tracked)
     frames = sorted(tracked)
     sure_of = np.array([tracked[n].confidence for n in frames])
-    assert abs(part_tracking.lost(np.array(frames), sure_of) - min(wrong)) <= 3
+    assert abs(tracking.lost(np.array(frames), sure_of) - min(wrong)) <= 3
 
 
 def test_a_subject_that_bends_is_not_lost(ground):
@@ -260,7 +260,7 @@ def test_where_a_subject_is_lost():
         ([1.0] * 17 + [0.2] * 3, 27),
         ([0.2] * 4 + [1.0] * 16, 13),  # backward
     ]:
-        assert part_tracking.lost(np.arange(10, 30), np.array(sure)) == expected
+        assert tracking.lost(np.arange(10, 30), np.array(sure)) == expected
 
 
 @pytest.mark.parametrize("kind", ["line", "lasso"])

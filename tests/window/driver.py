@@ -74,7 +74,10 @@ def video_editing_opened():
 
 
 def composing(previews):
-    return previews.looking.slices.last is not None or part("features.smooth.blender.smooth_previews").is_busy()
+    """Whether a first or a better picture is being made."""
+    smooth = part("features.smooth.blender.smooth_previews")
+    coming = list(smooth._coming)  # private: pictures of all effects
+    return previews.looking.slices.last is not None or any(map(smooth.smooth_comes, coming))
 
 
 def play(story, seconds=STEP):

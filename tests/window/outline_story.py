@@ -52,15 +52,12 @@ def carried():
 
 def mended():
     """The carried curve is pulled up at her head, and let go again by Esc; then that is undone."""
-    drawings, gizmo = (
-        part("features.outlines.blender.outline_drawings"),
-        part("features.outlines.blender.outline_operators"),
-    )
+    operators = part("features.outlines.blender.outline_operators")
     before = shapes()
     with driver.override("PREVIEW"):
         scene, effect, strip = part("blender.data.selection").active(bpy.context)
-        curves = drawings.shown_curves(scene, effect, strip, effect.active_region)
-        assert gizmo.SHUTTER_GGT_outline.poll(bpy.context)
+        curves = operators.shown_curves(scene, effect, strip, effect.active_region)
+        assert operators.SHUTTER_GGT_outline.poll(bpy.context)
     x, y = on_preview(*max(curves[0], key=lambda point: point[1]))
     yield from driver.drag(story.preview(), [(x, y), (x, y + 6), (x, y + 12), (x, y + 25)])
     yield from driver.until(lambda: FRAME in shapes(), "its frame is a drawing")

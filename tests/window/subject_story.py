@@ -34,9 +34,8 @@ def is_carrying():
 def curves():
     with driver.override("PREVIEW"):
         scene, effect, strip = part("blender.data.selection").active(bpy.context)
-        return part("features.outlines.blender.outline_drawings").shown_curves(
-            scene, effect, strip, effect.active_region
-        )
+        operators = part("features.outlines.blender.outline_operators")
+        return operators.shown_curves(scene, effect, strip, effect.active_region)
 
 
 def stroke_drawn():

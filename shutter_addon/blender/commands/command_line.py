@@ -1,21 +1,25 @@
 """Options that several commands have, and reading their inputs."""
 
 import argparse
+import math
 import os
 import re
 import sys
 from pathlib import Path
 
+import bpy
 from bpy.types import Scene
 
 from ...core.frames.frame_source import FrameSource
-from ...core.messages import sentence
+from ...core.messages import UserError, sentence
 from ...core.model.effect import Effect
+from ...core.model.keyframes import SourceTime
+from ...core.model.limits import MAX_FRAME
 from ...core.recipes import recipe_file
 from ...media import open_source
 from ...media.sequence import by_number
+from ..data import requirements
 from ..devices import available
-from ..editing import whole_edits
 from ..output import film_output
 from ..rendering import render_job
 
@@ -75,10 +79,70 @@ def files(medium: FrameSource) -> list[Path]:
     return [*files, *(map(beside, range(len(files))) if beside else ())]
 
 
-def open_edit(path: Path, asked: str | None) -> tuple[Scene, range]:
-    """Open a saved edit. Return its scene and frames as `frames`. UserError: there is no such edit, or frame."""
-    scene = whole_edits.open_edit(path)
+def length(medium: FrameSource, source_recipe: Effect) -> int:
+    """Return the length of the edit in timeline frames: that of the source, or up to the last key of its time."""
+    time = source_recipe.time
+    keys = [math.ceil(frame) for frame, _ in time.keys] if isinstance(time, SourceTime) else []
+    return min(max([medium.count, *keys]), MAX_FRAME)
+
+
+def open_edit(path: Path, asked: str | None = None, name: str | None = None) -> tuple[Scene, range]:
+    """Open a saved edit without running its scripts, and return its scene and frames.
+
+    Args:
+        asked: As in `frames`.
+        name: Of the scene; None: the active one.
+
+    Raises:
+        UserError: The file cannot be opened, or has no such edit or frame.
+    """
+    if not path.is_file():
+        raise UserError(f"{path}: " + ("is no file" if path.exists() else "no such file"))
+    try:
+        with film_output.quiet():
+            # With its windows, like `blender -b`: load_ui=False would stay set for later files.
+            bpy.ops.wm.open_mainfile(filepath=str(path), use_scripts=False)
+    except RuntimeError as error:
+        raise UserError(f"{path}: {film_output.message(error)}") from None
+    if name is not None and name not in bpy.data.scenes:
+        raise UserError(f'{path}: has no scene "{sentence(name, 40)}"')
+    scene = bpy.context.scene if name is None else bpy.data.scenes[name]
+    if name is None and not _has_strips(scene):
+        others = [other.name for other in bpy.data.scenes if _has_strips(other)]
+        where = f'; make "{others[0]}" the active one, and save the file' if others else ""
+        raise UserError(f'{path}: its active scene, "{scene.name}", has no strips{where}')
+    for setting, wanted in (("use_sequencer", True), ("use_multiview", False)):
+        if getattr(scene.render, setting) != wanted:
+            name, turn = scene.render.bl_rna.properties[setting].name, "on" if wanted else "off"
+            raise UserError(f'{path}: turn "{name}" {turn} in the scene "{scene.name}", and save the file')
+    for owner, driver in _scripts(scene) if name is None else ():  # drivers do not matter for the effects of a scene
+        words = f'a driver of the {owner.bl_rna.name.lower()} "{owner.name}" needs scripts, which are not run'
+        words += f" ({sentence(driver.expression, 40)}); bake it to keyframes, and save the file"
+        raise UserError(f"{path}: {words}")
     return scene, frames(asked, range(scene.frame_start, scene.frame_end + 1), "edit")
+
+
+def _scripts(scene: Scene) -> list[tuple]:
+    """Return (owner, driver) of each driver that needs scripts, among the data that the edit renders."""
+    used = requirements.used_data(scene, range(scene.frame_start, scene.frame_end + 1))
+    drivers = [(item, curve.driver) for item in used for curve in _driven(item)]
+    complex_ones = [pair for pair in drivers if pair[1].type == "SCRIPTED" and not pair[1].is_simple_expression]
+    if complex_ones:  # evaluation finds out which of them are valid
+        with film_output.quiet():
+            for other in used.intersection(bpy.data.scenes):
+                for layer in other.view_layers:
+                    layer.update()
+    return [(owner, driver) for owner, driver in complex_ones if not driver.is_valid]
+
+
+def _driven(item: bpy.types.ID) -> list:
+    """Return the driver curves of an ID and of its node tree."""
+    animations = (getattr(each, "animation_data", None) for each in (item, getattr(item, "node_tree", None)))
+    return [curve for animation in animations if animation for curve in animation.drivers]
+
+
+def _has_strips(scene: Scene) -> bool:
+    return bool(scene.sequence_editor and scene.sequence_editor.strips)
 
 
 def frames(text: str | None, whole: range, what: str = "clip") -> range:

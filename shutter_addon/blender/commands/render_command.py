@@ -1,6 +1,8 @@
 """The command `render`: a film of a source and a recipe, or of a saved edit, through Blender's sequencer."""
 
+import os
 from argparse import ArgumentParser, Namespace
+from contextlib import AbstractContextManager, suppress
 from pathlib import Path
 
 import bpy
@@ -8,13 +10,15 @@ from bpy.types import Scene
 
 from ...core import atomic_write
 from ...core.farm import job_file
+from ...core.frames.frame_source import FrameSource
 from ...core.model.effect import Effect
 from ...core.recipes import recipe
 from ...media.opening import MatteFile
 from ...media.rendered_pictures import is_whole_blend, why_short
-from ..data import external_files, versions
+from ..data import external_files, recipe_import, versions
+from ..data.property_copy import for_a_while
 from ..devices import available
-from ..editing import whole_edits
+from ..editing import add_effect
 from ..output import film_output, shared_frames
 from ..rendering import render_settings
 from . import command_line
@@ -76,10 +80,10 @@ def _render_source(arguments: Namespace) -> None:
         output, file_format = arguments.output, arguments.format or "png"
         if output:
             film_output.check(output, arguments.format, (medium.width, medium.height))
-        frames = command_line.frames(arguments.frames, range(1, whole_edits.length(medium, source_recipe) + 1))
+        frames = command_line.frames(arguments.frames, range(1, command_line.length(medium, source_recipe) + 1))
         read = path, *command_line.files(medium), arguments.recipe, *_mattes(source_recipe, arguments.recipe.parent)
         film_output.refuse_overwriting(_written(arguments, file_format, frames), read)
-        scene = whole_edits.make_edit(path, medium, source_recipe, arguments.recipe.parent)
+        scene = make_edit(path, medium, source_recipe, arguments.recipe.parent)
     scene.frame_start, scene.frame_end = frames[0], frames[-1]
     if output:
         available.choose(render_settings.wanted())  # before anything is written
@@ -90,6 +94,44 @@ def _render_source(arguments: Namespace) -> None:
         film_output.make_folder(arguments.weights)
     if output:
         film_output.render_made_edit(scene, output)
+
+
+def make_edit(path: Path, medium: FrameSource, source_recipe: Effect, folder: Path) -> Scene:
+    """Make an edit of one source strip with an effect, and return its scene.
+
+    Args:
+        medium: the source, opened.
+        folder: of the recipe.
+
+    Raises:
+        MediaError: a matte of the recipe cannot be read.
+    """
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    scene = bpy.context.scene
+    scene.name = "Edit"
+    render = scene.render
+    if medium.fps:
+        render.fps = max(1, round(medium.fps))
+        render.fps_base = render.fps / float(medium.fps)
+    render.resolution_x, render.resolution_y = medium.width, medium.height
+    render.resolution_percentage = 100
+    # Dither adds noise to a still frame. *Standard* shows the source's display values.
+    render.dither_intensity = 0
+    scene.view_settings.view_transform = "Standard"
+    editor = scene.sequence_editor_create()
+    # For a missing file Blender would show a picture whose size scripts leave uninitialized.
+    editor.show_missing_media = False
+    is_movie = medium.fps is not None
+    if is_movie and medium.has_audio:
+        editor.strips.new_sound(f"{path.name} Sound", str(path), 1, 1)
+    files = [str(path)] if is_movie else [str(file) for file in medium.files]
+    source = add_effect.new_footage(editor.strips, path.name, files, 2, 1, is_movie)
+    strip, effect = add_effect.add_effect(scene, source)
+    recipe_import.apply(scene, effect, strip, source_recipe, folder)
+    strip.right_handle = command_line.length(medium, source_recipe) + 1
+    scene.frame_start, scene.frame_end = strip.left_handle, strip.right_handle - 1
+    scene.frame_current = scene.frame_start
+    return scene
 
 
 def _written(arguments: Namespace, file_format: str, frames: range) -> list[Path]:
@@ -122,7 +164,7 @@ def _save(scene: Scene, path: Path) -> None:
     try:
         film_output.make_folder(path.parent)
         with atomic_write.writing(path) as part:
-            with film_output.quiet(), whole_edits.paths_relative(scene, path.parent):
+            with film_output.quiet(), _paths_relative(scene, path.parent):
                 bpy.ops.wm.save_as_mainfile(filepath=str(part), compress=True, copy=True, relative_remap=False)
             if not is_whole_blend(part):
                 raise film_output.OutputError(f"{path}: could not be saved whole; {why_short(part.parent)}")
@@ -130,3 +172,22 @@ def _save(scene: Scene, path: Path) -> None:
         raise film_output.OutputError(f"{path}: {film_output.message(error)}") from None
     except OSError as error:
         raise film_output.OutputError(f"{path}: {error.strerror or error}") from None
+
+
+_PATHS = {"MOVIE": "filepath", "IMAGE": "directory", "SOUND": "filepath"}  # path property of each type of strip
+
+
+def _paths_relative(scene: Scene, folder: Path) -> AbstractContextManager[None]:
+    """Make the edit's paths relative to the folder of its file, where possible, and restore them afterwards."""
+    owners = [(scene.render, "filepath")]
+    for strip in scene.sequence_editor.strips_all:
+        if strip.type in _PATHS:
+            owners.append((strip.sound if strip.type == "SOUND" else strip, _PATHS[strip.type]))
+    owners += [(image, "filepath") for image in bpy.data.images]
+    relative = []
+    for owner, name in owners:
+        if path := getattr(owner, name):
+            with suppress(ValueError):  # on another drive
+                end = "/" if path.endswith(os.sep) else ""  # relpath removes it
+                relative.append((owner, name, bpy.path.relpath(path, start=str(folder)) + end))
+    return for_a_while(relative)

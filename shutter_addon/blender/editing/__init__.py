@@ -1,1 +1,1 @@
-"""Changes of effects: add, edit, copy, track, bake, remove, restore."""
+"""Changes of effects: add, draw, key, copy, remove, restore."""

@@ -60,8 +60,10 @@ def _compare(effect: PropertyGroup) -> Shown | None:
     words = [word for word in add_effect.LOOK if look[word] != wanted[word]]
     if _goal(effect, strip, source)[:2] != (strip.left_handle, strip.right_handle):
         words.append(_RANGE)
-    lacks_modifiers, has_effects = _lacks_modifiers(strip, source), bool(effects_on(effect.id_data, source))
-    return Shown(source.name, words, lacks_modifiers, has_effects)
+    # The engine reads the file, without modifiers.
+    modifiers = Counter(modifier.type for modifier in source.modifiers if not modifier.mute)
+    lacks_modifiers = bool(modifiers - Counter(modifier.type for modifier in strip.modifiers))
+    return Shown(source.name, words, lacks_modifiers, bool(effects_on(effect.id_data, source)))
 
 
 def match(effect: PropertyGroup) -> Strip | None:
@@ -163,26 +165,16 @@ def put_back(effect: PropertyGroup, strip: Strip, before: list[np.ndarray | None
     """
     for drawing, old, new in zip(_drawings(effect), before, places(effect, strip), strict=True):
         if old is not None and new is not None and not np.array_equal(old, new):
-            _move(drawing, np.linalg.inv(new) @ old)
+            change = np.linalg.inv(new) @ old
+            for stroke in drawing.strokes:
+                points = fcurves.numbers(stroke.points, "co", size=3)
+                points[:, :2] = mapped(change, points[:, :2].astype(np.float64))
+                stroke.points.foreach_set("co", points.ravel())
 
 
 def _drawings(effect: PropertyGroup) -> list[AnnotationFrame]:
     layers = {layer.info: layer for region in effect.regions for layer in layers_of(effect, region)}
     return [drawing for layer in layers.values() for drawing in layer.frames]
-
-
-def _move(drawing: AnnotationFrame, change: np.ndarray) -> None:
-    """Move the strokes of a drawing in the image."""
-    for stroke in drawing.strokes:
-        points = fcurves.numbers(stroke.points, "co", size=3)
-        points[:, :2] = mapped(change, points[:, :2].astype(np.float64))
-        stroke.points.foreach_set("co", points.ravel())
-
-
-def _lacks_modifiers(part: Strip, source: Strip) -> bool:
-    """Return whether the effect strip lacks modifiers of the source. The engine reads the file, without modifiers."""
-    wanted = Counter(modifier.type for modifier in source.modifiers if not modifier.mute)
-    return bool(wanted - Counter(modifier.type for modifier in part.modifiers))
 
 
 def append_modifiers(scene: Scene, source: Strip, part: Strip) -> None:

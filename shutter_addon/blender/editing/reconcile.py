@@ -386,14 +386,10 @@ def follow_sources(shown: list[strips.Shown]) -> None:
         with suppress(MediaError):
             header = _header(source_media.spec(source)) if source else None
             if header is not None:
-                _follow_size(effect, strip, header[0])
+                if header[0] != picture_size(effect):
+                    with match_source.scribbles_kept(effect, strip):
+                        effect.scene.render.resolution_x, effect.scene.render.resolution_y = header[0]
                 _follow_mixing(strip, source, is_encoded=header[1])
-
-
-def _follow_size(effect: PropertyGroup, strip: Strip, size: tuple[int, int]) -> None:
-    if size != picture_size(effect):
-        with match_source.scribbles_kept(effect, strip):
-            effect.scene.render.resolution_x, effect.scene.render.resolution_y = size
 
 
 def _follow_mixing(strip: Strip, source: Strip, *, is_encoded: bool) -> None:

@@ -1,6 +1,11 @@
-"""Edit an effect's regions and their annotation layers: add, remove, move, key."""
+"""Edit an effect's regions and their annotation layers: add, remove, move, draw.
+
+Strokes stay where they were drawn: each drawing notes the placement that a moving region had.
+"""
 
 from collections.abc import Sequence
+from contextlib import suppress
+from itertools import repeat
 
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
@@ -9,11 +14,15 @@ from bpy.types import AnnotationLayer, PropertyGroup, Strip
 from ...core import revision
 from ...core.messages import EffectError
 from ...core.model import limits
+from ...core.model.effect import Drawings
+from ...core.model.motions import Placement
 from ...core.model.outlines import Curves
 from ...core.model.scribbles import mapped
-from ..data import annotations, fcurves, selection, strips
+from ..data import annotations, fcurves, selection, snapshot, strips
 from ..data.annotations import LAYERS, NOT_THIS, annotation, layer_of, layers_of
 from ..data.consistency import bars, choose_region, color_layers, forget_followed, unique
+from ..data.sampled import Sampling
+from . import motion_keys
 
 
 def why_full(effect: PropertyGroup, *, regions: int = 0, shutters: int = 0) -> str | None:
@@ -138,3 +147,47 @@ def assign_region(effect: PropertyGroup, index: int, shutter: PropertyGroup) -> 
     color_layers(effect, shutter)
     effect.active_region = index
     effect.active_shutter = list(effect.shutters).index(shutter)
+
+
+def hold_drawings(effect: PropertyGroup, index: int) -> None:
+    """Note the placement of a region for its drawings before it is moved. From then on they move with it."""
+    region = effect.regions[index]
+    if region.kind not in strips.LAID:
+        _note(effect, region, _origins(Sampling.of(effect.id_data, effect, None, ()).drawings(index)))
+
+
+def begin_drawing(effect: PropertyGroup, strip: Strip, index: int, *, erases: bool = False) -> None:
+    """Prepare the current frame for the pen, so that strokes appear where they are drawn.
+
+    A drawing of this frame is first stored where it appears. The eraser also needs the strokes that another frame's
+    drawing shows here, so they are stored at this frame, too.
+
+    Raises:
+        EffectError: the region has no placement.
+    """
+    region, scene = effect.regions[index], effect.id_data
+    frame = scene.frame_current
+    if region.kind in strips.LAID:
+        return
+    shown = snapshot.region_at(scene, effect, strip, index, (frame,))
+    here, origins = shown.placement(frame), _origins(shown.drawings)
+    is_elsewhere = any(origin != here for origin in origins.values())
+    if origins.get(frame, here) != here or (erases and is_elsewhere and frame not in origins):
+        draw_curves(effect, strip, region, shown.at(frame).strokes, frame)
+    if motion_keys.MotionKeys(effect, index, region.motion).are_made():
+        with suppress(EffectError):  # with locked curves, tracking stops, too
+            motion_keys.insert(effect, index)
+    _note(effect, region, {**origins, frame: here})
+
+
+def _origins(drawings: Drawings) -> dict[float, Placement]:
+    """Return the placement of the region for each drawing, by frame."""
+    return dict(zip(drawings.frames, drawings.origins or repeat(Placement()), strict=False))
+
+
+def _note(effect: PropertyGroup, region: PropertyGroup, origins: dict[float, Placement]) -> None:
+    region.drawn.clear()
+    for frame, origin in origins.items():
+        noted = region.drawn.add()
+        noted.frame, noted.location = frame - effect.start, origin.location
+        noted.rotation, noted.scale = np.radians(origin.rotation), origin.scale

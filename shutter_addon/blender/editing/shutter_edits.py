@@ -1,7 +1,4 @@
-"""Edit an effect's shutters: add, duplicate, remove, move, time maps.
-
-And operators of one click: subjects as layers without ghosts, and exposures that follow a region or the camera.
-"""
+"""Edit an effect's shutters: add, duplicate, remove, move, time maps, and regions as layers in front of others."""
 
 import numpy as np
 from bpy.app.translations import pgettext_data as data_
@@ -28,9 +25,6 @@ COLORS = (
     (0.529, 0.294, 0.176),
     (0.529, 0.471, 1.0),
 )
-
-
-# Shutters
 
 
 def start(effect: PropertyGroup) -> None:
@@ -131,9 +125,6 @@ def ramp_between(
     add_shutter(effect, *first)
     move_shutter(effect, effect.active_shutter, 0)
     return add_region(effect, add_shutter(effect, *last), "RAMP", name, ramp=ramp)
-
-
-# Layers, and a camera that stands still
 
 
 def as_layer(effect: PropertyGroup, index: int, own: str, rest: str, key: bool = False) -> None:

@@ -137,18 +137,13 @@ class SHUTTER_GT_bars(Dragged, Gizmo):
         self.paints = self.paints or max(abs(a - b) for a, b in zip(mouse, self.mouse, strict=True)) >= threshold
         # `tweak` has keys that are pressed during the drag, the event those that were held before.
         fine, snap = "PRECISE" in tweak or event.shift, "SNAP" in tweak or event.ctrl
-        if self.paints and (mouse != self.mouse or snap):
+        effect = self.target.effect()
+        if effect is not None and self.paints and (mouse != self.mouse or snap):
             point = mouse[0], self.point[1] + (mouse[1] - self.mouse[1]) * (_FINE if fine else 1.0)
-            self.mouse = mouse
-            self._paint(context, point, snap)
-
-    def _paint(self, context: Context, point: tuple[float, float], snap: bool) -> None:
-        if (effect := self.target.effect()) is None:
-            return
-        self.values = painted(self.values, self.place, self.point, point, snap)
-        bar_edits.paint(effect, self.index, self.values)
-        self.point = point
-        context.area.tag_redraw()
+            self.values = painted(self.values, self.place, self.point, point, snap)
+            bar_edits.paint(effect, self.index, self.values)
+            self.mouse, self.point = mouse, point
+            context.area.tag_redraw()
 
     def exit(self, context: Context, cancel: bool) -> None:
         effect = self.target.effect()

@@ -34,7 +34,13 @@ class SHUTTER_OT_full_quality(Named, Operator):
             window, area, shown = found
             previews.looking.whole = previews.Whole(shown.effect.scene.session_uid, shown.scene.frame_current)
             shown.strip.invalidate_cache("RAW")
-            _begin(window, area)
+            space, region = area.spaces.active, preview_areas.preview_region(area)
+            proxies = space.proxy_render_size, space.use_proxies
+            back = partial(_bring_back, area.as_pointer(), proxies, *_view_of(region))
+            space.proxy_render_size, space.use_proxies = "SCENE", False
+            _zoom(window, area, region.height)
+            main_thread.later(back, _TICK)  # it can end without a click
+            preview_areas.redraw()
         return {"FINISHED"}
 
 
@@ -46,15 +52,6 @@ def _shown(context: Context) -> tuple[Window, Area, preview_areas.Shown] | None:
             if (shown := preview_areas.shown(bpy.context)) is not None:
                 return window, area, shown
     return None
-
-
-def _begin(window: Window, area: Area) -> None:
-    space, region = area.spaces.active, preview_areas.preview_region(area)
-    back = partial(_bring_back, area.as_pointer(), (space.proxy_render_size, space.use_proxies), *_view_of(region))
-    space.proxy_render_size, space.use_proxies = "SCENE", False
-    _zoom(window, area, region.height)
-    main_thread.later(back, _TICK)  # it can end without a click
-    preview_areas.redraw()
 
 
 def _bring_back(address: int, proxies: tuple[str, bool], rows: float, centre: tuple[float, float]) -> float | None:

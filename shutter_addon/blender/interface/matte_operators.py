@@ -1,4 +1,4 @@
-"""Operators for mattes, ramps, time maps and rolling shutters."""
+"""Operators for mattes, ramps and time maps."""
 
 from pathlib import Path
 

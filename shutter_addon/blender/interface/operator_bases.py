@@ -28,10 +28,14 @@ def redraw(context: Context) -> None:
                 area.tag_redraw()
 
 
-def report(operator: Operator, sentence: str, kind: str = "WARNING") -> None:
-    """Report a translated sentence as a warning or error, and keep it for *Copy Report* without its names."""
+def report(operator: Operator, sentence: str, kind: str = "WARNING") -> set[str]:
+    """Report a translated sentence as a warning or error, and keep it for *Copy Report* without its names.
+
+    Return the result of an operator that has changed nothing.
+    """
     recent_errors.record(level=2)
     operator.report({kind}, sentence)
+    return {"CANCELLED"}
 
 
 def popup(context: Context, words: str, **looks: str) -> None:
@@ -91,8 +95,7 @@ class Named(Mixin):
         try:
             return step(*arguments) or {"FINISHED"}
         except (*FAULTS, UserError) as error:
-            report(self, str(error), "ERROR")
-            return {"CANCELLED"}
+            return report(self, str(error), "ERROR")
 
 
 class OfEffect(Named):

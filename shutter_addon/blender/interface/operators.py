@@ -20,7 +20,6 @@ from ..devices import main_thread
 from ..editing import (
     add_effect,
     bar_edits,
-    drawn_places,
     motion_keys,
     region_edits,
     shown_annotations,
@@ -57,7 +56,10 @@ def give_effect(context: Context) -> None:
     shutter_edits.start(effect)
     selection.choose(scene, strip)
     if not bpy.app.background:
-        show_panel(context)
+        for _window, area in preview_areas.previews(context):
+            area.spaces.active.show_region_ui = True
+        # A sidebar has no tabs before it is drawn. A slow window draws it late; one without room never does.
+        main_thread.later(partial(_choose_tab, iter([0.1] * 30)), 0.1)
     redraw(context)
 
 
@@ -118,15 +120,8 @@ def clean_trail(_self: Operator, context: Context, effect: PropertyGroup) -> Non
     shutter_edits.as_layer(effect, effect.active_region, "ANGLE_360", "STILL", bar_edits.auto_key(context))
 
 
-def show_panel(context: Context) -> None:
-    """Open the sidebar's Shutter tab in all previews."""
-    for _window, area in preview_areas.previews(context):
-        area.spaces.active.show_region_ui = True
-    # A sidebar has no tabs before it is drawn. A slow window draws it late; one without room never does.
-    main_thread.later(partial(_choose_tab, iter([0.1] * 30)), 0.1)
-
-
 def _choose_tab(waits: Iterator[float]) -> float | None:
+    """Open the sidebar's Shutter tab in all previews, as a timer."""
     areas = [area for _window, area in preview_areas.previews(bpy.context)]
     sidebars = [next(region for region in area.regions if region.type == "UI") for area in areas]
     drawn = [s for s in sidebars if not s.is_property_readonly("active_panel_category")]
@@ -204,10 +199,8 @@ def bars_key(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
 @operator("Delete Bar Keyframes", needs.a_shutter, icon="KEY_DEHLT")
 def bars_unkey(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
     """Delete the keyframes of all bars of the active shutter at the current frame"""
-    if not bar_edits.unkey_bars(effect, effect.active_shutter):
-        report(self, rpt_("No bar has a keyframe at the current frame"))
-        return {"CANCELLED"}
-    return None
+    is_deleted = bar_edits.unkey_bars(effect, effect.active_shutter)
+    return None if is_deleted else report(self, rpt_("No bar has a keyframe at the current frame"))
 
 
 class SHUTTER_OT_bar_set(OfEffect, Operator):
@@ -267,7 +260,7 @@ class SHUTTER_OT_draw(MakesEffect, OfEffect, Operator):
             if sentence := region_edits.why_full(effect, regions=1):  # poll() does not know the value of `new`
                 raise EffectError(sentence)
             region_edits.first_drawn(effect, selection.active_shutter(effect), self.kind)
-        drawn_places.begin(effect, self.effect_strip, effect.active_region)
+        region_edits.begin_drawing(effect, self.effect_strip, effect.active_region)
         layer = "not_layer" if self.not_this else "layer"
         if not drawing_tool(context, effect, "builtin.annotate", layer):
             self.report({"INFO"}, "Open a sequencer with a preview to draw")
@@ -277,7 +270,7 @@ class SHUTTER_OT_draw(MakesEffect, OfEffect, Operator):
 @operator("Erase", needs.strokes, only_seen=True)
 def erase(self: Operator, context: Context, effect: PropertyGroup) -> None:
     """Erase strokes of the active region in the preview"""
-    drawn_places.begin(effect, self.effect_strip, effect.active_region, erases=True)
+    region_edits.begin_drawing(effect, self.effect_strip, effect.active_region, erases=True)
     if not drawing_tool(context, effect, "builtin.annotate_eraser"):
         self.report({"INFO"}, "Open a sequencer with a preview to erase")
 
@@ -403,8 +396,8 @@ class SHUTTER_OT_copy_report(Named, Operator):
 
     def execute(self, context: Context) -> set[str]:
         if bpy.app.background:
-            report(self, rpt_("Without a window there is no clipboard: use the command check with --report"), "ERROR")
-            return {"CANCELLED"}
+            words = rpt_("Without a window there is no clipboard: use the command check with --report")
+            return report(self, words, "ERROR")
         context.window_manager.clipboard = error_report.text(selection.scene_of(context))
         self.report({"INFO"}, rpt_("Report copied: paste it into your message and read it before you send it"))
         return {"FINISHED"}

@@ -12,9 +12,8 @@ from ...core.model import shutters
 from ...core.model.choices import CONTEXT
 from ...core.model.effect import Shutter
 from ...core.model.fields import fields_of
-from ..data import annotations, consistency, data_format, selection, strips
-from ..editing import bar_edits, match_source
-from . import region_panels
+from ..data import annotations, consistency, data_format, selection, strips, validation
+from ..editing import bar_edits, match_source, motion_keys
 from .panel_parts import WIDEST, draw_list, draw_operators, draw_properties, menu, panel, pattern_icon, sentence
 
 
@@ -40,6 +39,12 @@ _ICONS = {
     "RAMP": "IPO_EASE_IN_OUT",
     "SUBJECT": "OUTLINER_OB_ARMATURE",
 }
+_BUTTONS = {  # operators of each kind with drawings
+    "LINE": ("subject_find", "outline_it"),
+    "OUTLINE": ("outline_it", "outline_needed"),
+    "SUBJECT": ("subject_outline", "subject_scribble"),
+}
+_OF_KIND = {"LINE": "width", "OUTLINE": "between", "RAMP": "ramp"}  # the property that only this kind has
 
 
 class SHUTTER_UL_regions(UIList):
@@ -72,8 +77,7 @@ def preset_menu(layout: UILayout, _context: Context) -> None:
 
 @menu("regions", "Region Specials")
 def region_menu(layout: UILayout, _context: Context) -> None:
-    for draw_new in features.each("draw_new"):
-        draw_new(layout)
+    features.call("draw_new", layout)
     draw_operators(layout, "", "matte_add", "matte_strip", "matte_mask", "outline_from_mask", "ramp_add")
     draw_operators(layout, "", "time_map", "rolling_shutter", "find_readout")
 
@@ -105,7 +109,9 @@ class SEQUENCER_PT_shutter(Panel):
             return
         effect = active[1]
         _draw_live(layout, context)
-        _draw_source(layout, effect)
+        shown = match_source.shown(effect)
+        words = iface_("Source: {strip}").format(strip=shown.source) if shown else iface_("Choose Source")
+        layout.operator_menu_enum("shutter.source", "strip", text=words, icon="SEQUENCE", translate=False)
         draw_list(layout, effect, "shutter", effect.shutters)
         row = layout.row(align=True)
         draw_operators(row, "draw")
@@ -114,8 +120,7 @@ class SEQUENCER_PT_shutter(Panel):
             row.operator("shutter.draw", text="Not This", icon="X").not_this = True
         draw_operators(row, "erase")
         row.menu("SHUTTER_MT_regions", text="", icon="DOWNARROW_HLT")
-        for draw_tracking in features.each("draw_tracking"):
-            draw_tracking(layout, effect.active_region, is_subject)
+        features.call("draw_tracking", layout, effect.active_region, is_subject)
         draw_operators(layout.row(align=True), "sharp_subject", "panning_shot", "clean_trail")
 
 
@@ -134,8 +139,7 @@ def _draw_exposure(layout: UILayout, scene: Scene, effect: PropertyGroup, strip:
     row.operator("shutter.bars_key", text="", icon="KEY_HLT")
     row.operator("shutter.bars_unkey", text="", icon="KEY_DEHLT")
     layout.prop(effect, "window")
-    for draw_smooth in features.each("draw_smooth"):
-        draw_smooth(layout, effect)
+    features.call("draw_smooth", layout, effect)
     layout.prop(shutter, "length")
     if shutter.length == "MOTION" and shutter.follow != "NOTHING":
         layout.prop(shutter, "trail")
@@ -191,13 +195,6 @@ def _draw_live(layout: UILayout, context: Context) -> None:
     notes.popover("SHUTTER_PT_notes", text="", icon="ERROR" if notes.alert else "INFO")
 
 
-def _draw_source(layout: UILayout, effect: PropertyGroup) -> None:
-    """Draw the menu that chooses the source, named after the current one."""
-    shown = match_source.shown(effect)
-    words = iface_("Source: {strip}").format(strip=shown.source) if shown else iface_("Choose Source")
-    layout.operator_menu_enum("shutter.source", "strip", text=words, icon="SEQUENCE", translate=False)
-
-
 def _notes(context: Context) -> Iterator[tuple[str, str]]:
     """Yield notes on the active effect, each with the operator that helps, or ""."""
     scene, effect, strip = selection.active(context)
@@ -244,9 +241,73 @@ class SHUTTER_PT_notes(Panel):
             sentence(column, words, "INFO")
             if operator:
                 column.operator(operator)
-        for draw_tracked in features.each("draw_tracked"):
-            for index in _tracked(effect):
-                draw_tracked(layout, effect, index)
+        for index in _tracked(effect):
+            features.call("draw_tracked", layout, effect, index)
+
+
+def _draw_regions(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:
+    layout.use_property_split = False
+    shutter = selection.active_shutter(effect)
+    own = [region for region in effect.regions if shutter and region.shutter == shutter.name]
+    draw_list(layout, effect, "region", own)
+    region = selection.active_region(effect)
+    if region is not None:
+        row = layout.row(align=True)
+        row.operator_menu_enum("shutter.region_assign", "shutter", text=region.shutter, translate=False)
+        row.prop(region, "kind", text="")
+        if region.kind in _OF_KIND:
+            row.prop(region, _OF_KIND[region.kind], text=None if region.kind == "LINE" else "")
+    layout.use_property_split = True
+    if region is None or region.kind not in strips.LAID:
+        layout.prop(effect, "edge_aware")
+    if region is None:
+        return
+    if region.kind == "MATTE":
+        _draw_matte(layout, region)
+    if region.kind not in strips.LAID:
+        layout.prop(region, "opacity")
+    if region.kind not in strips.MATTES:
+        row = layout.row(align=True)
+        draw_operators(row, *_BUTTONS.get(region.kind, _BUTTONS["LINE"]))
+        row.menu("SHUTTER_MT_of_outline", text="", icon="DOWNARROW_HLT")
+    if region.kind in strips.LAID:
+        _draw_blend(layout, region)
+    try:
+        validation.check_moving(region)
+    except EffectError as error:
+        sentence(layout, str(error), "ERROR")
+
+
+def _draw_matte(layout: UILayout, region: PropertyGroup) -> None:
+    """Draw the matte's source and settings."""
+    layout.prop(region, "matte")
+    if region.matte == "IMAGE":
+        layout.template_ID(region, "image", open="image.open")
+        if region.image is not None:
+            layout.prop(region.image, "source")
+        draw_properties(layout, region, "timing", "offset")
+    elif region.matte == "STRIP":
+        layout.prop_search(region, "strip_name", region.id_data.sequence_editor, "strips_all", text="Strip")
+    else:
+        layout.prop(region, "mask")
+    if region.matte != "MASK":
+        layout.prop(region, "channel")
+        if region.channel == "NAMED":
+            layout.prop(region, "channel_name", text="Name")
+
+
+def _draw_blend(layout: UILayout, region: PropertyGroup) -> None:
+    """Draw how a matte, ramp or outline blends with the mattes below."""
+    for name in ("opacity", "feather", "invert", "blend"):
+        row = layout.row()
+        row.active = name != "blend" or not region.is_layer  # a layer covers all of them
+        row.prop(region, name)
+    draw_operators(layout, "matte_export")
+
+
+def _draw_transform(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:
+    draw_properties(layout.column(align=True), selection.active_region(effect), *motion_keys.CHANNELS)
+    layout.operator("shutter.region_key", text="Insert Keyframes", icon="KEY_HLT")
 
 
 def _draw_move(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:
@@ -257,8 +318,7 @@ def _draw_move(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: S
     if shutter.follow != "NOTHING":
         draw_properties(layout, shutter, "follow_motion", "follow_smooth")
     if shutter.follow == "CAMERA":
-        for draw_tracking in features.each("draw_tracking"):
-            draw_tracking(layout, None)
+        features.call("draw_tracking", layout, None)
 
 
 def _draw_options(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:
@@ -277,8 +337,8 @@ def _draw_options(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip
 
 classes = (
     SEQUENCER_PT_shutter,
-    panel("_regions", "Regions", region_panels.draw_regions, bl_options=set()),
-    panel("_transform", "Transform", region_panels.draw_transform, selection.active_region, "_regions"),
+    panel("_regions", "Regions", _draw_regions, bl_options=set()),
+    panel("_transform", "Transform", _draw_transform, selection.active_region, "_regions"),
     panel("_exposure", "", _draw_exposure, selection.active_shutter, bl_options=set(), draw_header=_draw_header),
     panel("_move", "Exposure Moves With", _draw_move, selection.active_shutter, "_exposure"),
     panel("_options", "Options", _draw_options),

@@ -116,7 +116,9 @@ def _draw() -> None:
         else:
             previews.looking.whole = None
             previews.looking.slices.end()
-            _tell_unseen(context, say)
+            active = selection.active(context)
+            if active is not None and context.space_data.show_overlays and not selection.seen(active[0]):
+                say(selection.why_unseen(active[0], active[2]))
         try:
             previews.refine()
         except effect_source.FAULTS as error:
@@ -151,21 +153,16 @@ def _show(context: Context, shown: Shown, decision: Decision | None, say: Say) -
         say(rpt_("Shutter: {fault}").format(fault=error))
 
 
-def _tell_unseen(context: Context, say: Say) -> None:
-    """Add a note why the active effect is not visible, if no other effect is."""
-    active = selection.active(context)
-    if active is None or selection.seen(active[0]) or not context.space_data.show_overlays:
-        return
-    say(selection.why_unseen(active[0], active[2]))
-
-
 def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, say: Say) -> None:
     settings, renderer, request = context.window_manager.virtual_shutter, wanted.renderer, wanted.request
     is_still = not context.screen.is_animation_playing
     if context.space_data.show_overlays:
         _tell_detail(wanted, annotations.picture_size(shown.effect), say)
-    if wanted.left > 0 or wanted.draws_result:
-        _warn(shown, say)
+    if wanted.left > 0 or wanted.draws_result:  # a picture drawn over the sequencer's cannot show all
+        if shown.strips_above:
+            say(rpt_("The strips above are hidden in this view"))
+        if shown.scene.view_settings.view_transform != "Standard":
+            say(rpt_("This view uses the view transform Standard"))
     if wanted.left > 0:
         _show_source(quad, shown, renderer, request, wanted.left)
     if wanted.draws_result:
@@ -181,23 +178,13 @@ def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, s
     if settings.view not in ("SCRIBBLES", "COEFFICIENTS"):
         _show_strokes(context, quad, shown, wanted.decision.snapshot)
     previews.looking.slices.end()
-    for note_tracking in features.each("note_tracking"):
-        note_tracking(say)
+    features.call("note_tracking", say)
     for sentence in pictures.shortages(renderer, wanted.decision.snapshot, request):
         say(sentence)
     # Measuring would slow down what is running.
     decision = wanted.decision
     if context.space_data.show_overlays and is_still and not decision.is_plain and not previews.may_be_late():
-        for note_streaks in features.each("note_streaks"):
-            note_streaks(shown.effect, decision.snapshot, renderer, decision.request, say)
-
-
-def _warn(shown: Shown, say: Say) -> None:
-    """Add notes about what a picture drawn over the sequencer's cannot show."""
-    if shown.strips_above:
-        say(rpt_("The strips above are hidden in this view"))
-    if shown.scene.view_settings.view_transform != "Standard":
-        say(rpt_("This view uses the view transform Standard"))
+        features.call("note_streaks", shown.effect, decision.snapshot, renderer, decision.request, say)
 
 
 def _tell_detail(wanted: Drawing, size: tuple[int, int], say: Say) -> None:
@@ -267,17 +254,13 @@ def _show_shares(
 ) -> None:
     """Draw a picture of labels or coefficients in their colors."""
     (texture, block), source = drawn, renderer.source
-    textures = {"labels" if step == "SCRIBBLES" else "coefficients": texture, "palette": _palette(colors)}
+    rgba, size = np.ones((len(colors), 4), dtype=np.float32), (len(colors), 1)
+    rgba[:, :3] = colors
+    data = gpu.types.Buffer("FLOAT", rgba.size, rgba.reshape(-1))
+    side_by_side = gpu.types.GPUTexture(size, layers=1, format="RGBA32F", data=data)
+    palette = Texture(None, (*size, 1), "rgba32f", side_by_side)
+    textures = {"labels" if step == "SCRIBBLES" else "coefficients": texture, "palette": palette}
     quad.draw(step, textures, opacity=opacity, block=block, size=(source.width, source.height), **more)
-
-
-def _palette(palette: Colors) -> Texture:
-    """Return a texture of colors, side by side."""
-    colors = np.ones((len(palette), 4), dtype=np.float32)
-    colors[:, :3] = palette
-    size = len(colors), 1
-    data = gpu.types.Buffer("FLOAT", colors.size, colors.reshape(-1))
-    return Texture(None, (*size, 1), "rgba32f", gpu.types.GPUTexture(size, layers=1, format="RGBA32F", data=data))
 
 
 def draw_notes(region: Region, notes: list[str]) -> None:

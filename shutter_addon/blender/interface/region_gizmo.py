@@ -12,7 +12,7 @@ from ...core import revision
 from ...core.messages import EffectError
 from ...core.model import scribbles
 from ..data import selection, snapshot, validation
-from ..editing import bar_edits, drawn_places, motion_keys
+from ..editing import bar_edits, motion_keys, region_edits
 from . import drawing
 from .gizmo_groups import TWEAK, Dragged, View, WithKeys, view
 from .operator_bases import popup
@@ -103,7 +103,7 @@ class SHUTTER_GT_region(Dragged, Gizmo):
     def grab(self, context: Context, event: Event, seen: Place) -> None:
         effect = selection.active(context)[1]
         region = selection.active_region(effect)
-        drawn_places.hold(effect, effect.active_region)
+        region_edits.hold_drawings(effect, effect.active_region)
         # During playback, another effect may become active.
         self.target = selection.Target.of(effect, effect.active_region)
         self.before = tuple(region.location), region.rotation, region.scale

@@ -98,8 +98,7 @@ def _lay_down() -> None:
             _choose(bpy.context, looking.pen.tool)
         if (seen := selection.in_picture(bpy.context)) and selection.active_region(seen[1]):
             consistency.aim_pen(seen[1])
-            for after_stroke in features.each("after_stroke"):
-                after_stroke(bpy.context, *seen)
+            features.call("after_stroke", bpy.context, *seen)
 
 
 _OWNER = object()  # of the message bus subscription

@@ -192,7 +192,7 @@ def _stamp_nothing(render: RenderSettings) -> None:
 
 
 def render_made_edit(scene: Scene, output: Path) -> None:
-    """Render an edit of whole_edits.make_edit to a movie or a folder.
+    """Render an edit of render_command.make_edit to a movie or a folder.
 
     Raises:
         OutputError: It cannot be rendered or written. Finished pictures stay, and the finished part of a movie under

@@ -228,13 +228,8 @@ def _best(
     if not is_read(context) and detail.smooth:
         for smooth_request in features.each("smooth_request"):
             return smooth_request(render, snapshot, frame, detail)
-    _rest_smooth()
+    features.call("rest_smooth")
     return render.request(snapshot, frame, detail)
-
-
-def _rest_smooth() -> None:
-    for rest_smooth in features.each("rest_smooth"):
-        rest_smooth()
 
 
 def _detail(context: Context, look: Look) -> effect_source.Detail:
@@ -307,10 +302,9 @@ def _time_up(context: Context, key: tuple) -> Slice:
 def refine() -> None:
     """Go on with the smooth pictures behind those drawn. One of effect_source.FAULTS: there is none."""
     if pen_is_down():
-        _rest_smooth()
+        features.call("rest_smooth")
     elif looking.slices.last is None:
-        for advance_smooth in features.each("advance_smooth"):
-            advance_smooth(_SLICE)
+        features.call("advance_smooth", _SLICE)
 
 
 def show_carried() -> None:

@@ -6,12 +6,12 @@ The engine, the draw handler, commands and the feed of a film get a RenderContex
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import bpy
 
 from ... import features
-from ...core.frames.frame_source import SourceFile
 from ...core.pixels.shown_levels import Display
 from ..devices import available, main_thread
 from . import render_job, render_settings
@@ -47,17 +47,12 @@ def _ask_offscreen() -> None:
         SESSIONS.offscreen.free()
 
 
-def _want_matte(file: SourceFile, frame: int) -> None:
-    """Have a matte made that a preview misses."""
-    features.needed("want_matte")(file, frame)
-
-
 # The window's pictures are made on its main thread and GPU. Renders have another device with a thread, because another
 # GL context cannot always be current beside Blender's (see GLDevice). In the background, Blender's GPU belongs to the
 # main thread.
 SESSIONS = _Sessions(
     offscreen=RenderSession(lambda: available.choose(render_settings.wanted()), _ask_window),
-    window=RenderSession(lambda: ("blender", None), _ask_offscreen, _want_matte),
+    window=RenderSession(lambda: ("blender", None), _ask_offscreen, partial(features.call, "want_matte")),
     waited_for=RenderSession(lambda: available.choose(render_settings.wanted(), window_waits=True), lambda: None),
 )
 
@@ -107,7 +102,6 @@ def drop_removed() -> None:
 
 def forget(*_: object) -> None:
     """Close all sources and free the devices, when a file is loaded or the extension is disabled."""
-    for forget_pictures in features.each("forget_pictures"):
-        forget_pictures()
+    features.call("forget_pictures")
     for session in SESSIONS:
         session.forget()

@@ -17,10 +17,9 @@ from ...core.model import scribbles
 from ...core.model.effect import Region, Subject
 from ...core.model.motions import Motion, Placement, Similarity
 from ...media.footage import Footage
-from . import part_tracking, registration, tracking
-from .part_tracking import FoundMotion
+from . import registration, tracking
 from .registration import Part
-from .tracking import Tracked, TrackingError
+from .tracking import FoundMotion, Tracked, TrackingError
 
 BARE = "the picture outside the regions has too few corners to follow"
 UNLIKE = "the picture is too unlike those before"
@@ -100,7 +99,7 @@ class CameraTrack(tracking.Track):
 
     def _tracker(self, start: int) -> tuple[_Pursuit, float]:
         found = _Pursuit(self._part, self._footage, start, self._motion)
-        return found, part_tracking.distinctness(found.anchor[0], self._footage.size[0])
+        return found, tracking.distinctness(found.anchor[0], self._footage.size[0])
 
 
 class _Pursuit:
@@ -158,7 +157,7 @@ class _Pursuit:
         known, sightings = self._last[1], []
         for guess in (self._speed.after(known), known):
             match = part.find(picture, guess.after(motion.inverse()), self._motion)
-            sure = part_tracking.confidence(match, picture)
+            sure = tracking.confidence(match, picture)
             sightings.append(FoundMotion(match.motion.after(motion) if match else known, sure))
             if sure >= _ANEW:
                 break

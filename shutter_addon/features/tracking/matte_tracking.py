@@ -18,8 +18,7 @@ from ...media import flow
 from ...media.footage import Footage
 from ...media.opencv import cv2
 from . import registration, tracking
-from .part_tracking import COVERED, LEFT, FoundMotion
-from .tracking import Tracked, TrackingError
+from .tracking import COVERED, LEFT, FoundMotion, Tracked, TrackingError
 
 EMPTY = "the outline encloses nothing here"
 

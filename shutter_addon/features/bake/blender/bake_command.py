@@ -9,7 +9,6 @@ from bpy.types import PropertyGroup, Scene, Strip
 
 from ....blender.commands import command_line
 from ....blender.data import strips
-from ....blender.editing import whole_edits
 from ....blender.output import film_output
 from ....core.messages import sentence
 from . import baked_film
@@ -29,7 +28,7 @@ def add(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> None:
-    scene = whole_edits.open_edit(arguments.source, arguments.scene)
+    scene, _frames = command_line.open_edit(arguments.source, name=arguments.scene)
     scene.frame_set(scene.frame_current)  # evaluates drivers and keys
     if arguments.attached:
         arguments.source.unlink(missing_ok=True)

@@ -1,21 +1,30 @@
-"""Operators and panel that bake an effect to a strip and unbake it."""
+"""Operators and panel that bake an effect to a strip and unbake it.
 
+Baked strips are movie or image strips with a rendered effect, above the muted effect strip. Both strips have the same
+bake identity, which cuts and copies keep.
+"""
+
+import uuid
+from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 
 import bpy
+from bpy.app.translations import pgettext_data as data_
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import EnumProperty
-from bpy.types import Context, Operator, PropertyGroup, Scene, Strip, UILayout
+from bpy.types import Context, MetaStrip, Operator, PropertyGroup, Scene, SequenceEditor, Strip, UILayout
 
-from ....blender.data import selection, strips
+from ....blender.data import effect_version, fcurves, selection, strips
 from ....blender.devices import main_thread
+from ....blender.editing import add_effect, match_source
 from ....blender.interface.operator_bases import Named, operator, redraw
 from ....blender.interface.panel_parts import panel, sentence
 from ....blender.output import film_output
-from ....core import messages
+from ....core import messages, revision
 from ....core.messages import EffectError, UserError
-from . import baked_film, baked_strips
+from . import baked_film
 
 TICK = 0.5  # seconds between two looks at the job
 STILL = 1.0  # seconds before the panel asks again whether the bake is outdated
@@ -52,13 +61,16 @@ def _why_baking(_effect: PropertyGroup) -> str | None:
 def bake(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
     """Render the effect in the background and add the film as a strip above it. Finished frames are kept"""
     _bake.failure = "", ""
-    baked_strips.check(self.edit, self.effect_strip)
+    if match_source.effects_on(self.edit, self.effect_strip):
+        words = rpt_('"{strip}" is the input of another strip, which would not show the baked one')
+        raise EffectError(words.format(strip=self.effect_strip.name))
+    _channel(self.edit, self.effect_strip)  # there has to be one
     film = baked_film.film_of(self.edit, effect, self.effect_strip, self.file_format)
     try:
         if bpy.app.background:
             baked_film.render(self.edit, effect, self.effect_strip, film, lambda: None)
         if film.is_finished():
-            baked_strips.add_strip(self.edit, self.effect_strip, film)
+            add_strip(self.edit, self.effect_strip, film)
             return None
         _bake.running = baked_film.start(self.edit, effect, self.effect_strip, film)
     except (film_output.OutputError, OSError) as error:
@@ -89,7 +101,14 @@ def _why_not_baked(_effect: PropertyGroup) -> str | None:
 @operator("Unbake", _why_not_baked)
 def unbake(self: Operator, _context: Context, _effect: PropertyGroup) -> None:
     """Remove the baked strip and show the effect again. The baked files stay"""
-    baked_strips.unbake(self.edit, self.effect_strip)
+    scene, strip = self.edit, self.effect_strip
+    parts = effect_parts(scene, strip)
+    for baked in baked_of(scene, strip):
+        (baked.parent_meta() or scene.sequence_editor).strips.remove(baked)
+    for part in parts:
+        _move(part.parent_meta() or scene.sequence_editor, part, part.virtual_shutter_bake.channel)
+        part.mute = False
+        part.property_unset("virtual_shutter_bake")
 
 
 def _look() -> float | None:
@@ -119,7 +138,7 @@ def _lay(job: baked_film.BakeJob) -> str | None:
     if not parts:
         return rpt_('the strip was removed during the bake; its film is "{path}"').format(path=job.film.place)
     try:
-        baked_strips.add_strip(scene, next((part for part in parts if part.name == job.strip), parts[0]), job.film)
+        add_strip(scene, next((part for part in parts if part.name == job.strip), parts[0]), job.film)
     except (EffectError, RuntimeError) as error:
         return messages.sentence(error)
     with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
@@ -162,11 +181,11 @@ def draw_panel(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Str
 
 
 def _draw_state(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
-    if not baked_strips.baked_of(scene, strip):
+    if not baked_of(scene, strip):
         sentence(layout, iface_("The baked strip was deleted"), "ERROR")
-    elif (is_stale := baked_strips.known_stale(scene, effect, strip)) is None:
-        main_thread.later(_ask_whether_stale, STILL)  # not while drawing: it reads the whole effect
-    elif is_stale:
+    elif (has_changed := revision.known("bake", _place(scene, effect, strip))) is None:
+        main_thread.later(_ask_whether_stale, STILL)  # not while drawing: is_stale reads the whole effect
+    elif has_changed:
         sentence(layout, iface_("The effect has changed since it was baked"), "ERROR")
     else:
         sentence(layout, iface_("Baked, and up to date"), "CHECKMARK")
@@ -174,8 +193,105 @@ def _draw_state(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: St
 
 def _ask_whether_stale() -> None:
     if (active := selection.active(bpy.context)) is not None:
-        baked_strips.is_stale(*active)
+        is_stale(*active)
         redraw(bpy.context)
+
+
+def add_strip(scene: Scene, strip: Strip, film: baked_film.Film) -> Strip:
+    """Add the baked strip of a finished film above its effect strip, which is muted, and return it.
+
+    It replaces the strip of an older bake.
+
+    Raises:
+        EffectError: no channel has room.
+    """
+    owner = strip.parent_meta() or scene.sequence_editor
+    for older in [baked for baked in baked_of(scene, strip) if strips.overlap(baked, strip)]:
+        owner.strips.remove(older)
+        _move(owner, strip, strip.virtual_shutter_bake.channel)
+    home = strip.channel
+    name, start = data_("{strip} Baked").format(strip=strip.name), round(strips.origin(strip)) + film.frames.start
+    is_movie = film.kind == "MOVIE"
+    files = [_relative(path) for path in ([film.place] if is_movie else film.pictures)]
+    baked = add_effect.new_footage(owner.strips, name, files, _channel(scene, strip), start, is_movie)
+    baked.left_handle, baked.right_handle = strip.left_handle, strip.right_handle
+    if any(home < each.channel < baked.channel and strips.overlap(each, strip) for each in owner.strips):
+        # Strips above the effect have to stay above its film.
+        spare = baked.channel
+        _move(owner, strip, _channel(scene, strip))
+        _move(owner, baked, home)
+        _move(owner, strip, spare)
+    add_effect.copy_look(strip, baked, keys=True)
+    if baked.color_multiply == strips.IN_CODE_VALUES:  # films do not need it
+        baked.color_multiply = 1
+    baked.blend_type, baked.blend_alpha = strip.blend_type, strip.blend_alpha
+    alpha = [f"{each.path_from_id()}.blend_alpha" for each in (strip, baked)]
+    fcurves.copy_curves(scene, alpha[0], scene, alpha[1])
+    match_source.append_modifiers(scene, strip, baked)
+    strip.mute = True
+    identity = uuid.uuid4().hex
+    for each in (strip, baked):
+        noted = each.virtual_shutter_bake
+        noted.identity, noted.version, noted.channel = identity, film.version, home
+        noted.first, noted.count = film.frames.start, len(film.frames)
+    baked.color_tag = strip.color_tag
+    add_effect.connect(scene, [baked, strip, *strip.connections])
+    return baked
+
+
+def _channel(scene: Scene, strip: Strip) -> int:
+    """Return the first unmuted channel with room above an effect strip.
+
+    Raises:
+        EffectError: there is none.
+    """
+    owner = strip.parent_meta() or scene.sequence_editor
+    for channel in range(strip.channel + 1, strips.CHANNELS + 1):
+        if _is_free(owner, strip, channel) and not owner.channels[channel].mute:
+            return channel
+    words = rpt_('no channel above "{strip}" has room for the baked strip')
+    raise EffectError(words.format(strip=strip.name))
+
+
+def _is_free(owner: SequenceEditor | MetaStrip, strip: Strip, channel: int) -> bool:
+    return not any(other.channel == channel and strips.overlap(other, strip) for other in owner.strips)
+
+
+def _move(owner: SequenceEditor | MetaStrip, strip: Strip, channel: int) -> None:
+    """Move a strip to a channel if there is room. Otherwise Blender would shift it in time."""
+    if _is_free(owner, strip, channel):
+        strip.channel = channel
+
+
+def _relative(path: Path) -> str:
+    """Return a path relative to the .blend file, so that both can be moved together."""
+    with suppress(ValueError):  # on another drive
+        return bpy.path.relpath(str(path))
+    return str(path)
+
+
+def baked_of(scene: Scene, strip: Strip) -> list:
+    """Return the baked strips of an effect strip that begin with it. Copies that were moved elsewhere do not count."""
+    start = round(strips.origin(strip))
+    parts = [other for other in selection.of_bake(scene, strip) if other.type in strips.SOURCES]
+    return [part for part in parts if round(strips.origin(part)) - part.virtual_shutter_bake.first == start]
+
+
+def effect_parts(scene: Scene, strip: Strip) -> list:
+    """Return the parts that a baked effect strip was cut into, with itself; []: it is not baked."""
+    start = round(strips.origin(strip))
+    parts = (other for other in selection.of_bake(scene, strip) if round(strips.origin(other)) == start)
+    return [part for part in parts if part.type == "SCENE"]
+
+
+def is_stale(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
+    """Return whether the baked film is outdated or gone."""
+    place = _place(scene, effect, strip)
+    return revision.until_change("bake", place, lambda: effect_version.is_changed(scene, effect, strip))
+
+
+def _place(scene: Scene, effect: PropertyGroup, strip: Strip) -> tuple:
+    return scene.session_uid, effect.identity, strip.name
 
 
 classes = (panel("_bake", "Bake", draw_panel),)

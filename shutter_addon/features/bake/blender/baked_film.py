@@ -83,19 +83,15 @@ def film_of(scene: Scene, effect: PropertyGroup, strip: Strip, kind: Kind, folde
         EffectError, MediaError: The strip cannot be baked.
     """
     _check(scene, effect, strip, kind)
+    if not folder and not bpy.data.filepath:
+        raise EffectError(rpt_("baked frames are stored beside the .blend file: save it first"))
     frames = effect_version.frames_of(strip)
     version = effect_version.key(scene, effect, strip, frames)
     name = f"{bpy.path.clean_name(strip.name)}_{version[:8]}"
     if kind == "MOVIE":
         name += film_parts.ENDING
-    return Film(kind=kind, frames=frames, version=version, place=(folder or default_folder()) / name)
-
-
-def default_folder() -> Path:
-    """Return the folder for films beside the .blend file. EffectError: the file is not saved."""
-    if not bpy.data.filepath:
-        raise EffectError(rpt_("baked frames are stored beside the .blend file: save it first"))
-    return Path(bpy.data.filepath).parent / FOLDER
+    folder = folder or Path(bpy.data.filepath).parent / FOLDER
+    return Film(kind=kind, frames=frames, version=version, place=folder / name)
 
 
 def _check(scene: Scene, effect: PropertyGroup, strip: Strip, kind: Kind) -> None:

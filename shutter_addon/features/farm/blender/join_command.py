@@ -29,23 +29,7 @@ def add(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> None:
-    scene, frames = command_line.open_edit(arguments.edit, arguments.frames)
-    film_output.check_movie(arguments.output, [arguments.edit, *versions.read_files(scene)])
-    for fault in external_files.sound_faults(scene, frames):
-        raise film_output.OutputError(fault)  # Blender would make a silent film
-    version = versions.of_edit(scene)
-    job_file.guard(arguments.folder, version)
-    join(scene, arguments.folder, arguments.output, frames, version.key)
-
-
-AT_ONCE = 1000  # pictures per strip: Blender copies all of them for each that is added
-
-
-def join(scene: Scene, folder: Path, output: Path, frames: range, key: str) -> None:
-    """Join rendered frames in a folder to a movie, whole or not at all. This changes `scene`: do not use it again.
-
-    Args:
-        key: Of the edit's version.
+    """Join rendered frames in a folder to a movie, whole or not at all.
 
     Raises:
         OutputError, MediaError: Frames are missing, damaged, different or of another edit, or the movie cannot be
@@ -53,18 +37,27 @@ def join(scene: Scene, folder: Path, output: Path, frames: range, key: str) -> N
         InterruptedRenderError: Stopped by Ctrl-C or TERM.
         OSError: A folder cannot be read or made.
     """
+    scene, frames = command_line.open_edit(arguments.edit, arguments.frames)
+    film_output.check_movie(arguments.output, [arguments.edit, *versions.read_files(scene)])
+    for fault in external_files.sound_faults(scene, frames):
+        raise OutputError(fault)  # Blender would make a silent film
+    version = versions.of_edit(scene)
+    job_file.guard(arguments.folder, version)
     scene.frame_start, scene.frame_end = frames[0], frames[-1]
-    paths = _pictures(folder, frames[:: scene.frame_step])
+    paths = _pictures(arguments.folder, frames[:: scene.frame_step])
     size = film_output.size(scene)
-    film_output.check(output, None, size)
+    film_output.check(arguments.output, None, size)
     with film_output.progress(len(paths), "picture") as looked:
-        first = _common(paths, looked, size, key)
+        first = _common(paths, looked, size, version.key)
     _refuse_transparency(scene, paths, first)
     _cover_edit(scene, paths, first)
-    _set_output(scene, output, size)
-    film_output.make_folder(output.parent)
+    _set_output(scene, arguments.output, size)
+    film_output.make_folder(arguments.output.parent)
     with film_output.progress(len(paths), "frame") as moved:
-        film_output.render_frames(scene, output, moved)
+        film_output.render_frames(scene, arguments.output, moved)
+
+
+AT_ONCE = 1000  # pictures per strip: Blender copies all of them for each that is added
 
 
 def _pictures(folder: Path, frames: range) -> list[Path]:

@@ -27,16 +27,14 @@ class _Carrying:
 
     Attributes:
         frames: Source frames to make: drawn ones first, then those nearest to the middle.
-        arrived: Called on the main thread when the drawn ones are done, and at the end.
         middle: A source frame; None: the middle of the frames.
         done: How many are made.
-        told: How many were made when `arrived` was called.
+        told: How many were made when previews were redrawn: when the drawn ones are done, and at the end.
         soon: How many of the frames are drawn.
     """
 
     file: CarriedFile
     frames: list[int]
-    arrived: Callable[[], None]
     middle: int | None = None
     done: int = 0
     told: int = 0
@@ -82,33 +80,11 @@ def want_matte(file: CarriedFile, frame: int) -> None:
         _mattes.wanted.setdefault(file, set()).add(frame)
 
 
-def begin(arrived: Callable[[], None]) -> str | None:
-    """Make the mattes that were missed since the last call, in place of those that are not wanted any more.
-
-    Called on the main thread after a preview was drawn.
-
-    Args:
-        arrived: Called when they are made.
-
-    Returns:
-        Why mattes cannot be made, or None.
-    """
-    wanted = {file: frames for file, frames in _mattes.wanted.items() if file not in _mattes.failed}
-    _mattes.wanted.clear()
-    if wanted and not (_mattes.carrying and _mattes.carrying.file in wanted):
-        file, frames = next(iter(wanted.items()))
-        carry(file, list(frames), arrived)
-    return next(iter(_mattes.failed.values()), None)
-
-
-def carry(file: CarriedFile, frames: list[int], arrived: Callable[[], None], middle: int | None = None) -> None:
-    """Make the mattes of source frames, from a middle outwards, in place of those being made.
-
-    `arrived` is as in `begin`.
-    """
+def carry(file: CarriedFile, frames: list[int], middle: int | None = None) -> None:
+    """Make the mattes of source frames, from a middle outwards, in place of those being made."""
     stop()
     _mattes.failed.pop(file, None)
-    _mattes.carrying = _Carrying(file=file, frames=frames, arrived=arrived, middle=middle)
+    _mattes.carrying = _Carrying(file=file, frames=frames, middle=middle)
     main_thread.later(_look, TICK)
 
 
@@ -124,11 +100,18 @@ def progress() -> tuple[int, int] | None:
 
 
 def note_tracking(say: Callable[[str], None]) -> None:
-    """Track missing mattes of outlines, and add a note on the progress."""
-    fault, made = begin(previews.show_carried), progress()
-    if fault is not None:
+    """Make the mattes that were missed since the last call, and add notes on the progress and why some are impossible.
+
+    They take the place of those that are not wanted any more. Called on the main thread after a preview was drawn.
+    """
+    wanted = {file: frames for file, frames in _mattes.wanted.items() if file not in _mattes.failed}
+    _mattes.wanted.clear()
+    if wanted and not (_mattes.carrying and _mattes.carrying.file in wanted):
+        file, frames = next(iter(wanted.items()))
+        carry(file, list(frames))
+    for fault in list(_mattes.failed.values())[:1]:
         say(rpt_("Shutter: {fault}").format(fault=fault))
-    if made is not None:
+    if (made := progress()) is not None:
         done, total = made
         say(rpt_("Tracking the outline: {done} of {total} frames").format(done=done, total=total))
 
@@ -141,7 +124,7 @@ def _look() -> float | None:
     if not carrying.future.done():
         if carrying.done >= carrying.soon > carrying.told:  # show drawings as soon as they are corrected
             carrying.told = carrying.done
-            carrying.arrived()
+            previews.show_carried()
         return TICK
     _mattes.carrying = None
     try:
@@ -150,7 +133,7 @@ def _look() -> float | None:
         return None
     except Exception as error:  # otherwise Blender ends the timer, and previews start over again
         _mattes.failed[carrying.file] = in_words(error)
-    carrying.arrived()
+    previews.show_carried()
     return None
 
 

@@ -1,6 +1,10 @@
-"""Operators and the gizmo of outlines and subjects: find, track, correct, and go to where a drawing is needed."""
+"""Operators and the gizmo of outlines and subjects: find, track, correct, and go to where a drawing is needed.
+
+Annotations have no key types in Blender 5.2, so the Dope Sheet shows generated and hand-made drawings the same way.
+"""
 
 from contextlib import closing
+from functools import lru_cache
 
 import bpy
 import numpy as np
@@ -9,22 +13,125 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import Context, Event, Gizmo, GizmoGroup, Operator, PropertyGroup, Scene, Strip, UILayout
 
-from ....blender.data import selection, strips
+from ....blender.data import selection, snapshot, strips
+from ....blender.data.annotations import layer_of
 from ....blender.editing import region_edits
 from ....blender.interface import drawing, needs
 from ....blender.interface.gizmo_groups import Dragged, View, WithKeys, view
 from ....blender.interface.operator_bases import Beside, OfEffect, operator, popup, redraw, report, show_status
 from ....blender.interface.region_gizmo import SHUTTER_GGT_region
-from ....blender.rendering import previews
+from ....blender.rendering import effect_source, previews
 from ....blender.rendering.effect_source import FAULTS
-from ....core.messages import UserError
-from ....core.model import outlines
-from . import outline_carrying, outline_drawings, subjects
+from ....core import revision
+from ....core.messages import EffectError, UserError
+from ....core.model import outlines, scribbles
+from ....media import flow, outlining
+from .. import carrying
+from ..carried_mattes import CarriedMattes
+from ..subject_mattes import CarriedFile
+from . import outline_carrying
 
+SURE_SUBJECT = 0.5  # a more confident frame of a subject needs no correction
+SURE = 0.75  # a more confident frame needs no drawing: its overlap is usually 90 %
 _COLOR = (0.2, 0.9, 1.0, 0.9)
 _NEAR = 6  # interface units from the pointer to a curve that it can grab
 _REACH = 0.08  # fraction of the picture's height: how far a pull reaches along the curve at first
 _MORE = 1.25  # factor for each turn of the wheel
+
+
+def curves_now(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> outlines.Curves:
+    """Return the curves of an outline at the current frame, in fractions of the picture.
+
+    They are drawn or tracked, or interpolated linearly where nothing is tracked yet.
+
+    Raises:
+        EffectError, MediaError: there are none.
+    """
+    frame = scene.frame_current
+    if not strips.is_carried(effect.regions[index]):
+        return outlines.curves(snapshot.strokes_at(scene, effect, strip, index, frame))
+    file, shown = snapshot.carried_outline(scene, effect, strip, index, (frame,))
+    with closing(_opened(file)) as mattes:
+        return mattes.curves(min(shown[frame], mattes.count - 1))
+
+
+@lru_cache(1)  # opening a movie for each frame would be slow; reading opens it again
+def _opened(file: CarriedFile) -> CarriedMattes:
+    return file.open()
+
+
+def shown_curves(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> outlines.Curves:
+    """Return `curves_now` for drawing code. The result is kept until something changes."""
+    key = effect.scene.session_uid, strip.name, index, scene.frame_current
+    return revision.until_change("outline", key, lambda: curves_now(scene, effect, strip, index))
+
+
+def carried_frames(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> tuple[CarriedFile, dict[int, int]]:
+    """Return the mattes of an outline or subject, and the source frame for each timeline frame of its strip.
+
+    Raises:
+        EffectError, MediaError: nothing is tracked.
+    """
+    frames = range(strip.left_handle, strip.right_handle)
+    file, shown = snapshot.carried_outline(scene, effect, strip, index, frames)
+    return file, {int(frame): number for frame, number in shown.items()}
+
+
+def next_needed(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> tuple[int | None, float]:
+    """Return the least confident frame of a tracked outline or subject, the middle one of several, and its confidence.
+
+    None: no frame needs a drawing, as all have this confidence.
+
+    Raises:
+        EffectError, MediaError: nothing is tracked.
+    """
+    file, shown = carried_frames(scene, effect, strip, index)
+    is_subject = effect.regions[index].kind == "SUBJECT"
+    drawn = [] if is_subject else [number for number, _curves in file.drawings]
+    with closing(file.open()) as mattes:
+        known = {frame: mattes.confidence(number) for frame, number in shown.items() if number not in drawn}
+    # Not all mattes of a subject may be made. Frames of an outline without one are too far from any drawing.
+    sure = {frame: share or 0.0 for frame, share in known.items() if not (is_subject and share is None)}
+    enough = SURE_SUBJECT if is_subject else SURE
+    least = min(sure.values(), default=enough)
+    if least >= enough:
+        return None, enough
+    worst = sorted(frame for frame, share in sure.items() if share == least)
+    return worst[len(worst) // 2], least
+
+
+def find_subject(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> bool:
+    """Make a region a subject if the model finds one under the strokes that are nearest to the current frame; an
+    outline becomes one by its drawings, which stay.
+
+    Returns:
+        Whether it has found one.
+
+    Raises:
+        EffectError: There are no strokes.
+        MediaError: There is no picture or no model.
+    """
+    region, before = effect.regions[index], effect.regions[index].kind
+    if before == "OUTLINE":
+        region.kind, region.layer, region.outline_layer = "SUBJECT", "", region.layer
+        return True
+    layer, frame = layer_of(effect, region), scene.frame_current
+    drawn = [drawing.frame_number for drawing in layer.frames] if layer else []
+    frame = min(drawn, key=lambda each: abs(each - frame), default=frame)
+    if not snapshot.strokes_at(scene, effect, strip, index, frame):
+        raise EffectError(rpt_("The region has no strokes at the current frame"))
+    region.kind, is_found = "SUBJECT", False
+    try:
+        file, shown = snapshot.carried_outline(scene, effect, strip, index, (frame,))
+        with closing(file.open()) as mattes:  # its first matte is kept, and shown at once
+            mattes.read(shown[frame])
+            is_found = bool(mattes.confidence(shown[frame]))
+    finally:
+        if not is_found:
+            region.kind = before
+    if is_found:
+        region.motion = "LOCATION"
+    return is_found
 
 
 class SHUTTER_OT_outline_needed(Beside, OfEffect, Operator):
@@ -38,7 +145,7 @@ class SHUTTER_OT_outline_needed(Beside, OfEffect, Operator):
     def begin(self, context: Context, waits: bool) -> set[str] | None:
         scene, effect, strip = selection.active(context)
         self._target = selection.Target.of(effect, effect.active_region)
-        file, shown = outline_drawings.carried_frames(scene, effect, strip, effect.active_region)
+        file, shown = carried_frames(scene, effect, strip, effect.active_region)
         with closing(file.open()) as mattes:
             frames = sorted({number for number in shown.values() if not mattes.has(number)})
             if waits:
@@ -47,7 +154,7 @@ class SHUTTER_OT_outline_needed(Beside, OfEffect, Operator):
         if waits or not frames:
             return self._go(context)
         self._file = file
-        outline_carrying.carry(file, frames, previews.show_carried, shown.get(scene.frame_current))
+        outline_carrying.carry(file, frames, shown.get(scene.frame_current))
         return self.go_on(context)
 
     def goes_on(self, _context: Context) -> bool:
@@ -68,7 +175,7 @@ class SHUTTER_OT_outline_needed(Beside, OfEffect, Operator):
 
     def _go(self, context: Context) -> set[str] | None:
         scene, effect, strip = selection.active(context)
-        frame, confidence = outline_drawings.next_needed(scene, effect, strip, self._target.index)
+        frame, confidence = next_needed(scene, effect, strip, self._target.index)
         if frame is None:
             sentence = rpt_("The confidence is {share:.0f} % or more at all frames")
             self.report({"INFO"}, sentence.format(share=100 * confidence))
@@ -84,10 +191,9 @@ class SHUTTER_OT_outline_needed(Beside, OfEffect, Operator):
 def outline_draw(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
     """Turn the tracked outline at the current frame into a drawing that can be edited"""
     scene, strip, index = self.edit, self.effect_strip, effect.active_region
-    curves = outline_drawings.curves_now(scene, effect, strip, index)
+    curves = curves_now(scene, effect, strip, index)
     if not curves:
-        report(self, rpt_("The outline is empty at the current frame"))
-        return {"CANCELLED"}
+        return report(self, rpt_("The outline is empty at the current frame"))
     region_edits.draw_curves(effect, strip, effect.regions[index], curves, scene.frame_current)
     return None
 
@@ -95,19 +201,40 @@ def outline_draw(self: Operator, _context: Context, effect: PropertyGroup) -> se
 @operator("Find Outline", needs.strokes, only_seen=True)
 def outline_it(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
     """Make the active region an outline of the subject that its strokes mark or enclose at this frame"""
-    if not outline_drawings.outline_it(self.edit, effect, self.effect_strip, effect.active_region):
-        report(self, rpt_("No subject stands out from its surroundings"))
-        return {"CANCELLED"}
+    scene, strip, index = self.edit, self.effect_strip, effect.active_region
+    region, frame = effect.regions[index], scene.frame_current
+    there = snapshot.region_at(scene, effect, strip, index, (frame,))
+    strokes = there.drawings.at(frame) if region.kind == "OUTLINE" else there.at(frame).strokes
+    if not len(strokes):
+        raise EffectError(rpt_("The region has no strokes at the current frame"))
+    taken = snapshot.take(scene, effect, strip, (frame,))
+    with effect_source.open_source(taken) as source:
+        samples = source.read(effect_source.clip_of(taken, source).shown(frame).source_frame)
+        picture = flow.displayed(samples, source.transfer, source.alpha)
+    width, height = carrying.working_size(*picture.shape[1::-1])
+    encloses = region.kind != "LINE"
+    shape = scribbles.Shape(shutter=0, kind="line", width=region.width, strokes=tuple(strokes))
+    drawn = outlines.coverage(strokes, width, height) > 0.5 if encloses else np.zeros((height, width), bool)
+    if not drawn.any():
+        drawn = scribbles.rasterise([shape], width, height) > 0
+    curves = outlining.proposed(picture, drawn, encloses=encloses)
+    if not curves:
+        return report(self, rpt_("No subject stands out from its surroundings"))
+    if region.kind != "OUTLINE":  # drawings of an outline at other frames stay
+        region.kind, region.motion = "OUTLINE", "LOCATION"
+        layer = layer_of(effect, region)
+        for drawing in list(layer.frames):
+            layer.frames.remove(drawing)
+    region_edits.draw_curves(effect, strip, region, curves, frame)
     return None
 
 
 @operator("Find Subject", needs.strokes, only_seen=True)
 def subject_find(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
     """Make the active region a subject, which a model finds under its strokes at this frame and follows"""
-    if not subjects.find(self.edit, effect, self.effect_strip, effect.active_region):
-        report(self, rpt_("The model finds no subject under the stroke: draw along its middle, or outline it"))
-        return {"CANCELLED"}
-    return None
+    if find_subject(self.edit, effect, self.effect_strip, effect.active_region):
+        return None
+    return report(self, rpt_("The model finds no subject under the stroke: draw along its middle, or outline it"))
 
 
 @operator("Scribble", needs.a_subject, icon="IPO_LINEAR")
@@ -119,18 +246,33 @@ def subject_scribble(_self: Operator, _context: Context, effect: PropertyGroup) 
 @operator("Outline", needs.a_subject, icon="CURVE_BEZCIRCLE", only_seen=True)
 def subject_outline(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
     """Turn the active subject into an outline, with a drawing at each frame where you drew on the subject"""
-    if not subjects.to_outline(self.edit, effect, self.effect_strip, effect.active_region):
-        report(self, rpt_("The subject has no outline there"))
-        return {"CANCELLED"}
+    strip, index = self.effect_strip, effect.active_region
+    region = effect.regions[index]
+    layers = [layer_of(effect, region, name) for name in ("layer", "outline_layer")]
+    frames = sorted({drawing.frame_number for layer in layers if layer for drawing in layer.frames})
+    file, shown = snapshot.carried_outline(self.edit, effect, strip, index, frames)
+    with closing(file.open()) as mattes:
+        for frame in frames:
+            mattes.read(shown[frame])
+        curves = {frame: mattes.curves(shown[frame]) for frame in frames}
+    if not any(curves.values()):
+        return report(self, rpt_("The subject has no outline there"))
+    region_edits.remove_layers(effect, region)
+    region.kind = "OUTLINE"
+    for frame, drawn in curves.items():
+        region_edits.draw_curves(effect, strip, region, drawn, frame)
     return None
 
 
 def after_stroke(context: Context, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
     """Look for a subject under the first stroke of a new effect; the pen draws on the subject from now on."""
-    if not subjects.is_first_stroke(effect, effect.regions[effect.active_region]):
+    region = effect.regions[effect.active_region]
+    layer = layer_of(effect, region)
+    drawn = sum(len(drawing.strokes) for drawing in layer.frames) if layer else 0
+    if not (region.finds_subject and region.kind == "LINE" and drawn == 1):
         return
     try:
-        is_found = subjects.find(scene, effect, strip, effect.active_region)
+        is_found = find_subject(scene, effect, strip, effect.active_region)
     except (*FAULTS, UserError) as error:
         popup(context, str(error), icon="ERROR")
         return
@@ -157,7 +299,7 @@ class SHUTTER_GT_outline(Dragged, Gizmo):
             return None
         scene, effect, strip = seen
         try:
-            curves = outline_drawings.shown_curves(scene, effect, strip, effect.active_region)
+            curves = shown_curves(scene, effect, strip, effect.active_region)
         except UserError:  # panels and the live preview show the error
             return None
         return (curves, view(effect, strip, context.region)) if curves else None

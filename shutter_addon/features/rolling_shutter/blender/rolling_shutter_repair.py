@@ -20,7 +20,7 @@ from ....blender.data import snapshot, source_media, strips, validation
 from ....blender.data.consistency import bars
 from ....blender.data.sampled import Sampling
 from ....blender.editing import bar_edits, region_edits, shutter_edits
-from ....blender.interface.operator_bases import OfEffect, operator
+from ....blender.interface.operator_bases import operator
 from ....core.messages import EffectError
 from ....core.model.choices import CONTEXT, READS, SIDES
 from ....core.model.frame_state import Options
@@ -87,7 +87,11 @@ def repair(scene: Scene, effect: PropertyGroup, strip: Strip, share: float, side
     Raises:
         EffectError, MediaError: it has no room, the footage cannot be read, or OpenCV is missing. Nothing has changed.
     """
-    backward = _is_backward(scene, effect, strip)
+    frame = scene.frame_current
+    if (time := Sampling.of(scene, effect, strip, (frame,)).time) is not None:
+        backward = bool(time.at(frame)[1])
+    else:
+        backward = source_media.timing_of(strips.source_of(scene, effect, strip)).use_reverse_frames
     known = of(effect)
     if known is None and (sentence := region_edits.why_full(effect, regions=1, shutters=2)):
         raise EffectError(sentence)
@@ -113,24 +117,50 @@ def repair(scene: Scene, effect: PropertyGroup, strip: Strip, share: float, side
     effect.active_region = list(effect.regions).index(region)
 
 
-def _is_backward(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
-    """Return whether the source runs backward at the current frame."""
-    frame = scene.frame_current
-    if (time := Sampling.of(scene, effect, strip, (frame,)).time) is not None:
-        return bool(time.at(frame)[1])
-    return bool(source_media.timing_of(strips.source_of(scene, effect, strip)).use_reverse_frames)
+def _why_no_repair(effect: PropertyGroup) -> str | None:
+    try:
+        has_repair = of(effect) is not None
+    except EffectError as error:
+        return str(error)
+    return None if has_repair else region_edits.why_full(effect, regions=1, shutters=2)
 
 
-def find(scene: Scene, effect: PropertyGroup, strip: Strip, *, columns: bool) -> tuple[float, str]:
-    """Find the readout of a source around the current frame, and the side that is read first.
+_SIDE = EnumProperty(
+    name="Read First",
+    description="The side of the picture that the sensor reads first",
+    items=SIDES,
+    translation_context=CONTEXT,
+)
+_READOUT = FloatProperty(
+    name="Readout",
+    description="Time from reading the first row to the last, as a percentage of a frame",
+    subtype="PERCENTAGE",
+    default=50.0,
+    min=1.0,
+    max=100.0,
+    options={"SKIP_SAVE"},
+)
+_READS = EnumProperty(
+    name="Reads",
+    description="Whether the sensor reads row by row or column by column",
+    items=READS,
+    translation_context=CONTEXT,
+)
 
-    Args:
-        columns: whether the sensor reads column by column.
 
-    Raises:
-        EffectError: there is none, or it cannot be found.
-        MediaError: the footage cannot be read.
-    """
+@operator("Rolling Shutter Repair", _why_no_repair, icon="CAMERA_DATA", side=_SIDE, readout=_READOUT)
+def rolling_shutter(self: Operator, _context: Context, effect: PropertyGroup) -> None:
+    """Show every row as it was when the middle one was filmed, so that skewed lines become straight"""
+    known = of(effect)
+    if known is not None and not self.properties.is_property_set("readout"):
+        self.readout = 100 * known.readout  # choosing a side in the menu keeps the readout
+    repair(self.edit, effect, self.effect_strip, self.readout / 100, self.side)
+
+
+@operator("Find Readout", _why_no_repair, icon="VIEWZOOM", reads=_READS)
+def find_readout(self: Operator, _context: Context, effect: PropertyGroup) -> None:
+    """Find the sensor's readout time from lines that lean while they move around the current frame, and repair it"""
+    scene, strip, columns = self.edit, self.effect_strip, self.reads == "COLUMNS"
     frame = scene.frame_current
     index = snapshot.source_frames(scene, effect, strip, (frame,))[frame]
     with ShotSource(source_media.open_media(strips.source_of(scene, effect, strip))) as medium:
@@ -145,62 +175,8 @@ def find(scene: Scene, effect: PropertyGroup, strip: Strip, *, columns: bool) ->
             raise EffectError(sentence.format(why=rpt_(str(error)))) from None
     if abs(found) < LEAST:
         raise EffectError(rpt_("moving lines stay upright: there is no rolling shutter to repair"))
-    sides = ("LEFT", "RIGHT") if columns else ("TOP", "BOTTOM")
-    return found, sides[found < 0]
-
-
-def _why_no_repair(effect: PropertyGroup) -> str | None:
-    try:
-        has_repair = of(effect) is not None
-    except EffectError as error:
-        return str(error)
-    return None if has_repair else region_edits.why_full(effect, regions=1, shutters=2)
-
-
-class SHUTTER_OT_rolling_shutter(OfEffect, Operator):
-    """Show every row as it was when the middle one was filmed, so that skewed lines become straight"""
-
-    bl_label = "Rolling Shutter Repair"
-    icon = "CAMERA_DATA"
-    choices = "side"
-    needs = (_why_no_repair,)
-
-    side: EnumProperty(
-        name="Read First",
-        description="The side of the picture that the sensor reads first",
-        items=SIDES,
-        translation_context=CONTEXT,
-    )
-    readout: FloatProperty(
-        name="Readout",
-        description="Time from reading the first row to the last, as a percentage of a frame",
-        subtype="PERCENTAGE",
-        default=50.0,
-        min=1.0,
-        max=100.0,
-        options={"SKIP_SAVE"},
-    )
-
-    def change(self, _context: Context, effect: PropertyGroup) -> None:
-        known = of(effect)
-        if known is not None and not self.properties.is_property_set("readout"):
-            self.readout = 100 * known.readout  # choosing a side in the menu keeps the readout
-        repair(self.edit, effect, self.effect_strip, self.readout / 100, self.side)
-
-
-_READS = EnumProperty(
-    name="Reads",
-    description="Whether the sensor reads row by row or column by column",
-    items=READS,
-    translation_context=CONTEXT,
-)
-
-
-@operator("Find Readout", _why_no_repair, icon="VIEWZOOM", reads=_READS)
-def find_readout(self: Operator, _context: Context, effect: PropertyGroup) -> None:
-    """Find the sensor's readout time from lines that lean while they move around the current frame, and repair it"""
-    found, side = find(self.edit, effect, self.effect_strip, columns=self.reads == "COLUMNS")
-    repair(self.edit, effect, self.effect_strip, min(abs(found), 1.0), side)
+    side = (("LEFT", "RIGHT") if columns else ("TOP", "BOTTOM"))[found < 0]
+    repair(scene, effect, strip, min(abs(found), 1.0), side)
     name = next(name for word, name, _ in SIDES if word == side)
     percent = round(100 * abs(found))
     sentence = rpt_("Readout of {percent} % of a frame, read first: {side}")

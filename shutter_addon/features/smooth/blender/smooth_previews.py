@@ -134,11 +134,6 @@ def smooth_comes(scene: int) -> bool:
     return scene in _coming and not _coming[scene].is_over
 
 
-def is_busy() -> bool:
-    """Tell whether any smooth picture is being made."""
-    return any(map(smooth_comes, _coming))
-
-
 def advance_smooth(seconds: float) -> None:
     """Compose the smooth pictures whose plain ones were drawn, for some seconds each.
 

@@ -9,7 +9,7 @@ from bisect import bisect_left, bisect_right
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.types import MovieClip, MovieTrackingTrack, PropertyGroup, Scene, Strip
+from bpy.types import MovieClip, MovieTrackingObject, MovieTrackingTrack, PropertyGroup, Scene, Strip
 
 from ....blender.data import annotations, external_files, fcurves, snapshot, source_media, strips, validation
 from ....blender.editing import motion_keys
@@ -48,6 +48,12 @@ def follow(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> Non
     region.stops.clear()
 
 
+def holder_of(region: PropertyGroup) -> MovieTrackingObject | None:
+    """Return the object with the tracks of a region's clip; None: it has no such object."""
+    objects = region.follow_clip.tracking.objects
+    return objects.get(region.follow_object) if region.follow_object else objects[0]
+
+
 def _markers(region: PropertyGroup) -> list[Point]:
     """Return name, frames (n,) and places (n, 2) of each point that a region follows.
 
@@ -59,8 +65,7 @@ def _markers(region: PropertyGroup) -> list[Point]:
     clip = region.follow_clip
     if clip is None:
         raise EffectError(rpt_("Choose a clip first"))
-    holder = clip.tracking.objects.get(region.follow_object) if region.follow_object else clip.tracking.objects[0]
-    if holder is None:
+    if (holder := holder_of(region)) is None:
         raise _missing(clip, region.follow_object)
     if region.follow_kind == "OBJECT":
         return [_track_markers(track) for track in holder.tracks]
@@ -101,8 +106,11 @@ def _points(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, start
     motion_keys.check_curves(effect, index)
     validation.word(region, "motion")
     tracks, size = _markers(region), annotations.picture_size(effect)
-    times = _clip_times(scene, effect, strip, region.follow_clip)
-    by_frame = _points_by_frame(tracks, times, size)
+    by_frame: dict[int, Points] = {}
+    for frame, time in _clip_times(scene, effect, strip, region.follow_clip).items():
+        at_time = {name: _place_at(frames, places, time) for name, frames, places in tracks}
+        if points := {name: motions.pixel(place, size) for name, place in at_time.items() if place is not None}:
+            by_frame[frame] = points
     if start not in by_frame:
         name = region.follow_object if region.follow_kind == "OBJECT" else region.follow_track
         sentence = rpt_('"{track}" of clip "{clip}" has no marker at frame {frame}')
@@ -123,19 +131,12 @@ def _clip_times(scene: Scene, effect: PropertyGroup, strip: Strip, clip: MovieCl
     frames = range(strip.left_handle, strip.right_handle)
     source = strips.source_of(scene, effect, strip)
     _check_footage(source, clip)
-    shown, first = snapshot.take(scene, effect, strip, frames), _first_frame(source, clip)
+    begins_as_clip = source.type == "MOVIECLIP" and not source_media.first_frame(source)
+    first = 1 if begins_as_clip else 1 - clip.frame_offset  # the clip's frame that is the first one of the medium
+    shown = snapshot.take(scene, effect, strip, frames)
     with effect_source.open_source(shown) as source:
         clip = effect_source.clip_of(shown, source)
         return {frame: clip.shown(frame).source_frame / clip.step + first for frame in frames}
-
-
-def _points_by_frame(tracks: list[Point], times: dict[int, float], size: tuple[int, int]) -> dict[int, Points]:
-    """Return the markers that exist at each frame's time. Frames without any are left out."""
-    by_frame = {}
-    for frame, time in times.items():
-        at_time = {name: _place_at(frames, places, time) for name, frames, places in tracks}
-        by_frame[frame] = {name: motions.pixel(place, size) for name, place in at_time.items() if place is not None}
-    return {frame: points for frame, points in by_frame.items() if points}
 
 
 def _check_footage(source: Strip, clip: MovieClip) -> None:
@@ -150,13 +151,6 @@ def _check_footage(source: Strip, clip: MovieClip) -> None:
     if first.resolve() != external_files.absolute(clip, clip.filepath).resolve():
         sentence = rpt_('clip "{clip}" does not begin with the same file as strip "{strip}"')
         raise EffectError(sentence.format(clip=clip.name, strip=source.name))
-
-
-def _first_frame(source: Strip, clip: MovieClip) -> int:
-    """Return the clip's frame that is the first frame of the strip's medium."""
-    if source.type == "MOVIECLIP" and not source_media.first_frame(source):
-        return 1
-    return 1 - clip.frame_offset
 
 
 def _place_at(frames: np.ndarray, places: np.ndarray, time: float) -> np.ndarray | None:

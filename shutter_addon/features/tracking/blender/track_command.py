@@ -10,7 +10,6 @@ from .... import features
 from ....blender.commands import command_line
 from ....blender.data import preferences
 from ....blender.data.source_media import SourceSpec
-from ....blender.editing import whole_edits
 from ....blender.output import film_output
 from ....blender.rendering import render_job
 from ....core import atomic_write
@@ -54,7 +53,7 @@ def run(arguments: Namespace) -> None:
             filter(None, (arguments.output, arguments.report)),
             [arguments.source, *command_line.files(medium), arguments.recipe],
         )
-        frames = command_line.frames(arguments.frames, range(1, whole_edits.length(medium, source_recipe) + 1))
+        frames = command_line.frames(arguments.frames, range(1, command_line.length(medium, source_recipe) + 1))
         if arguments.frame not in frames:
             within = f"{frames[0]}:{frames[-1]}"
             raise film_output.OutputError(f"--frame: {arguments.frame} is not within the frames {within}")

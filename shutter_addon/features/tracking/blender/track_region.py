@@ -30,7 +30,7 @@ from ....core.model.effect import Camera, Region
 from ....core.model.frame_state import Options
 from ....core.model.keyframes import Samples
 from ....media.footage import Footage
-from .. import camera_tracking, matte_tracking, part_tracking, tracking
+from .. import camera_tracking, matte_tracking, tracking
 from ..tracking import Tracked
 
 
@@ -137,30 +137,22 @@ def _stops(effect: PropertyGroup, index: int | None) -> list[tuple[int, Property
     return [(round(frame), stop) for frame, stop in known if math.isfinite(frame)]
 
 
-def _track(effect: PropertyGroup, index: int | None) -> tuple[list[int], list[presence.Stop]]:
-    """Return the timeline frames with a track, and where it ended."""
-    frames, confidence = MotionKeys(effect, index, "LOCATION").confidence()
-    seen = np.round(frames[confidence > 0]).astype(int).tolist()
-    ends = [presence.Stop(at, stop.forward, stop.fault == tracking.SHOT_ENDS) for at, stop in _stops(effect, index)]
-    return seen, ends
-
-
 def key_ends(effect: PropertyGroup, index: int | None) -> None:
     """Key the influence where the track ends, or remove such keyframes. An outline needs none."""
-    keys, (seen, stops), fades = MotionKeys(effect, index, "SCALE"), _track(effect, index), []
+    keys, fades = MotionKeys(effect, index, "SCALE"), []
+    frames, confidence = keys.confidence()
+    seen = np.round(frames[confidence > 0]).astype(int).tolist()
+    ends = [presence.Stop(at, stop.forward, stop.fault == tracking.SHOT_ENDS) for at, stop in _stops(effect, index)]
     has_matte = index is not None and effect.regions[index].kind in strips.LAID
     if selection.moving(effect, index).track_ends and seen and not has_matte:
         if index is None:
-            fades = presence.keys(seen, stops, (), _reach(effect), beside=1)
+            # No exposure reaches frames with unknown motion.
+            window, position = validation.number(effect, "window"), validation.word(effect, "position").lower()
+            reach = max(Options(window=window, position=position).reach, presence.FADE)
+            fades = presence.keys(seen, ends, (), reach, beside=1)
         else:
-            fades = presence.keys(seen, stops, keys.edited(range(min(seen), max(seen) + 1)))
+            fades = presence.keys(seen, ends, keys.edited(range(min(seen), max(seen) + 1)))
     keys.fade(motion_keys.ENDS[index is None], fades)
-
-
-def _reach(effect: PropertyGroup) -> int:
-    """Return the frames of the camera's fade, so that no exposure reaches frames with unknown motion."""
-    window, position = validation.number(effect, "window"), validation.word(effect, "position").lower()
-    return max(Options(window=window, position=position).reach, presence.FADE)
 
 
 def confidence_at(effect: PropertyGroup, index: int | None, frame: float) -> float | None:
@@ -172,7 +164,7 @@ def confidence_at(effect: PropertyGroup, index: int | None, frame: float) -> flo
 def next_unsure(effect: PropertyGroup, index: int | None, frame: float) -> int | None:
     """Return the least confident frame of the next stretch of unsure frames, or None."""
     frames, confidence = MotionKeys(effect, index, "LOCATION").confidence()
-    unsure = (frames <= limits.MAX_FRAME) & (confidence < part_tracking.SURE)
+    unsure = (frames <= limits.MAX_FRAME) & (confidence < tracking.SURE)
     begins = np.flatnonzero(unsure & ~np.append(False, unsure[:-1]) & (frames > frame))
     if not len(begins):
         return None
@@ -188,7 +180,7 @@ def faults(effect: PropertyGroup, index: int | None) -> list[tuple[int, str, boo
 
 def lost(effect: PropertyGroup, index: int | None) -> tuple[int, str] | None:
     """Return the timeline frame where tracking lost the subject, and a note in the user's language, or None."""
-    frame = part_tracking.lost(*MotionKeys(effect, index, "LOCATION").confidence())
+    frame = tracking.lost(*MotionKeys(effect, index, "LOCATION").confidence())
     if frame is None:
         return None
     words = rpt_(
