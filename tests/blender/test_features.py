@@ -13,8 +13,7 @@ from shutter_addon.features import FEATURES
 
 ROOT = Path(__file__).parents[2]
 KEPT = "shutter_addon", "shaders", "tests", "models", "pyproject.toml", "blender_manifest.toml"
-# Of the core: editing, reading and sampling effects, and pictures of the engine.
-CORE = "test_editing", "test_snapshot", "test_effects", "test_timing"
+CORE = "test_editing", "test_snapshot", "test_timing"
 
 
 @pytest.mark.parametrize("feature", FEATURES)
