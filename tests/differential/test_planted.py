@@ -40,11 +40,7 @@ FAULTS = {
     "mattes in another order": (mattes, "blended", lambda c, shown, values: blended(c, shown[::-1], values[::-1])),
     "hard mattes": (matte_values, "feathered", lambda values, width: values),
     "outlines of hard edges": (mattes, "coverage", lambda *given: np.round(coverage(*given))),
-    "a straight ramp": (
-        mattes.Ramp,
-        "values",
-        lambda ramp, *size: ramp_values(replace(ramp, placed=replace(ramp.placed, rotation=0)), *size),
-    ),
+    "a straight ramp": (mattes.Ramp, "values", lambda ramp, *size: ramp_values(mattes.Ramp(ramp.kind), *size)),
     "ghosts": (layering, "behind", lambda values: np.ones_like(values[0])),
     "what a camera pans over": (layer_frames, "uncovered", lambda colors, seen, *_: (colors, seen)),
     "the mean for the median": (compositor, "weighted_median", lambda values, weights: mean(values, weights)),
