@@ -2,6 +2,16 @@
 
 Each is a folder: its algorithm, and in the folder `blender` what uses bpy. To remove one, delete its folder and its
 name in FEATURES. Modules in `blender` register as those of the package `blender` do. Commands are named …_command.
+
+The rest looks up these names:
+
+- `SmoothSource`, `steps_for`, `CarriedFile`, `MarkedSubject`, `still_mask`: sources of frames and mattes.
+- `want_matte`, `next_needed`: mattes that previews miss, and the frame that needs a drawing.
+- `smooth_request`, `smooth_comes`, `advance_smooth`, `rest_smooth`: smooth pictures of previews.
+- `note_streaks`, `note_tracking`: notes in previews; `notes`: notes in the panel.
+- `draw_new`, `draw_smooth`, `draw_tracking`, `draw_tracked`, `tracking_icon`: parts of panels.
+- `after_stroke`: called when the pen goes up.
+- `forget`: called before another file is loaded; `forget_pictures`: called when the devices are freed.
 """
 
 from collections.abc import Iterator
