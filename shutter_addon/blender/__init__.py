@@ -12,10 +12,11 @@ from . import interface
 
 # The classes of each are registered (classes_of), then its `register` is called.
 _DATA = "data.preferences", "data.properties", "data.movie_decoding"
-_INTERFACE = [f"interface.{module.name}" for module in iter_modules(interface.__path__)]
+_GIZMOS = "interface.probe_gizmo", "interface.region_gizmo"  # what is registered before them is grabbed before them
+_INTERFACE = sorted({f"interface.{module.name}" for module in iter_modules(interface.__path__)} - set(_GIZMOS))
 _MODULES = "devices.main_thread", *_DATA, "rendering.engine", *_INTERFACE
 _modules = [import_module(f".{name}", __package__) for name in _MODULES]
-_modules += [*features.modules(), import_module(".handlers", __package__)]
+_modules += [*features.modules(), *(import_module(f".{name}", __package__) for name in (*_GIZMOS, "handlers"))]
 
 
 def classes_of(module: ModuleType) -> tuple[type, ...]:

@@ -341,5 +341,5 @@ classes = (
     panel("_transform", "Transform", _draw_transform, selection.active_region, "_regions"),
     panel("_exposure", "", _draw_exposure, selection.active_shutter, bl_options=set(), draw_header=_draw_header),
     panel("_move", "Exposure Moves With", _draw_move, selection.active_shutter, "_exposure"),
-    panel("_options", "Options", _draw_options),
+    panel("_options", "Options", _draw_options, bl_order=1),
 )

@@ -294,5 +294,5 @@ def _place(scene: Scene, effect: PropertyGroup, strip: Strip) -> tuple:
     return scene.session_uid, effect.identity, strip.name
 
 
-classes = (panel("_bake", "Bake", draw_panel),)
+classes = (panel("_bake", "Bake", draw_panel, bl_order=2),)
 unregister = forget

@@ -36,7 +36,7 @@ FOLDER = "virtual_shutter_baked"  # beside the .blend file
 Kind = Literal["MOVIE", "OPEN_EXR"]
 KINDS: dict[str, Kind] = {"movie": "MOVIE", "exr": "OPEN_EXR"}  # by the command's names
 _CHANNELS = ["R", "G", "B", "A"]
-_ROOT = Path(__file__).parents[3]  # of the extension, or of the checkout
+_ROOT = Path(__file__).parents[4]  # of the extension, or of the checkout
 Picture = Callable[[int], np.ndarray]  # gives that of a frame
 
 

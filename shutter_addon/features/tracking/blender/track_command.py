@@ -98,7 +98,9 @@ def _followed(
     effect = source_recipe.for_picture(medium.width / medium.height)
     subject: Any = effect.camera if index is None else effect.regions[index]
     options = source_recipe.options.at(1)
-    step = features.needed("steps_for")(medium, options.step, options.window, skip_repeats=options.skip_repeats)
+    step = 1
+    for steps_for in features.each("steps_for"):
+        step = steps_for(medium, options.step, options.window, skip_repeats=options.skip_repeats)
     with ExitStack() as ends:
         moments = medium if step == 1 else features.needed("SmoothSource")(medium, step)
         shots = ends.enter_context(ShotSource(PrefetchSource(moments), step))
