@@ -11,4 +11,4 @@ WRITTEN = ("out", "cache")
 
 # For the tests' makers of footage, edits and recipes, and their comparisons of a device with the references.
 TESTS = "tests", "tests/media", "tests/blender", "tests/compute", "tests/differential"
-sys.path += [str(ROOT / folder) for folder in (".", *TESTS)]
+sys.path[:0] = [str(ROOT / folder) for folder in (".", *TESTS)]

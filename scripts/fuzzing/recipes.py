@@ -22,15 +22,6 @@ FOOTAGE = (
 )
 
 
-def plausible(random, longest: int) -> dict:
-    """A recipe that keeps to the format, with a window of so many frames at most."""
-    from test_export import following_recipes
-
-    from shutter_addon.core.recipes import recipe_file, records
-
-    return json.loads(recipe_file.dump(records.effect_of(hostile.drawn(following_recipes(longest), random))))
-
-
 def make(random, folder):
     import cases
     from support import write_frames
@@ -38,13 +29,12 @@ def make(random, folder):
     write_frames(folder / "in", np.random.default_rng(0).integers(0, 256, (4, *SIZE[::-1], 3), dtype=np.uint8))
     hostile.outside(folder)
     plan = {"footage": random.choice(FOOTAGE), "direction": random.choice((1, -1))}
-    if random.random() < 0.5:
-        plan["seed"] = random.getrandbits(31)
-        case = cases.make(plan["seed"], mixed=True)
-        cases.write_mattes(case, folder)
-        data = json.loads(case.recipe)
-    else:
-        data = plausible(random, random.choice((4, 16, 256)))
+    seed, mixed = random.getrandbits(31), random.random() < 0.5
+    case = cases.make(seed, mixed=mixed)
+    cases.write_mattes(case, folder)
+    if mixed:
+        plan["seed"] = seed
+    data = json.loads(case.recipe)
     text = hostile.as_json(hostile.spoiled(random, data, random.choice((0, 0, 1, 1, 1, 2, 5))))
     (folder / "recipe.json").write_bytes(hostile.damaged(random, text) if random.random() < 0.1 else text)
     (folder / "plan.json").write_text(json.dumps(plan))

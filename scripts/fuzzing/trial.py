@@ -156,7 +156,7 @@ def attempt(folder: Path, module: str, seconds: float) -> None:
     os.setpgid(0, 0)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     _watch(seconds)
-    sys.path += import_module("fuzzing.warm").PATH
+    sys.path[:0] = import_module("fuzzing.warm").PATH
     kind, given, work = import_module(module), folder / "input", folder / "work"
     if not given.exists():
         given.mkdir()
