@@ -135,7 +135,7 @@ def baked():
     area = driver.area_of("SEQUENCE_EDITOR", "PREVIEW")
     side = driver.region_of(area, "UI")
     yield from scrolled_down(side)
-    driver.click(side, side.width * 0.4, 51)  # the panel opens; below it is Copy Report
+    driver.click(side, side.width * 0.4, 14)  # the last panel opens
     yield 1.0
     yield from scrolled_down(side)
     low = driver.screen(side, 0, 0)
