@@ -29,8 +29,7 @@ def _forget_file(*_) -> None:
     edit_feed.end()
     sharp_frame.forget()
     operator_bases.end_all()
-    for forget in features.each("forget"):
-        forget()
+    features.call("forget")
     revision.edit.replaced += 1
     sessions.forget()
     invalidation.forget()

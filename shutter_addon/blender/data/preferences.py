@@ -9,7 +9,6 @@ from bpy.types import Context
 from ...core.model.choices import CONTEXT
 from ...media.files import MODEL
 from . import strips
-from .properties import labelled
 
 ADDON = __package__.rpartition(".shutter_addon")[0] or "shutter_addon"
 
@@ -30,19 +29,27 @@ def _model_changed(_preferences: bpy.types.AddonPreferences, _context: Context) 
 class ShutterPreferences(bpy.types.AddonPreferences):
     bl_idname = ADDON
 
-    device: labelled(
-        "Render Device", "Device that composes renders. Previews always use the GPU that Blender draws with"
-    )(EnumProperty, update=None, items=DEVICES, translation_context=CONTEXT)
-    gpu_memory: labelled(
-        "GPU Memory",
-        "Megabytes of the GPU's memory that frames and pictures may take, from the next render on."
+    device: EnumProperty(
+        name="Render Device",
+        description="Device that composes renders. Previews always use the GPU that Blender draws with",
+        items=DEVICES,
+        translation_context=CONTEXT,
+    )
+    gpu_memory: IntProperty(
+        name="GPU Memory",
+        description="Megabytes of the GPU's memory that frames and pictures may take, from the next render on."
         " 0: three quarters of what there is, and half of the machine's memory at most",
-    )(IntProperty, update=None, min=0, soft_max=65536, translation_context=CONTEXT)
-    model: labelled(
-        "Subject Model",
-        "ONNX file of another model that finds subjects: one picture in, one mask out."
+        min=0,
+        soft_max=65536,
+        translation_context=CONTEXT,
+    )
+    model: StringProperty(
+        name="Subject Model",
+        description="ONNX file of another model that finds subjects: one picture in, one mask out."
         " Empty: the one that Virtual Shutter brings",
-    )(StringProperty, update=_model_changed, subtype="FILE_PATH")
+        update=_model_changed,
+        subtype="FILE_PATH",
+    )
 
     def draw(self, _context: Context) -> None:
         for name in ("device", "gpu_memory", "model"):

@@ -77,18 +77,14 @@ def _region_renamed(region: PropertyGroup, new: str, old: str, is_set: bool) -> 
     return new
 
 
-def labelled(name: str, description: str) -> Callable[..., object]:
-    """Return what makes a property of a kind with these texts. By default it changes pictures."""
-
-    def made(kind: Callable, **more: Any) -> object:
-        return kind(name=name, description=description, **({"update": changed} | more))
-
-    return made
+def labelled(kind: Callable, name: str, description: str, **more: Any) -> object:
+    """Return a property of a kind, which by default changes pictures."""
+    return kind(name=name, description=description, **({"update": changed} | more))
 
 
 def choice(name: str, description: str, items: Sequence[tuple[str, str, str]], **more: Any) -> object:
     """Return an enum property without keys, which by default changes pictures."""
-    return labelled(name, description)(EnumProperty, items=items, options=set(), **more)
+    return labelled(EnumProperty, name, description, items=items, options=set(), **more)
 
 
 class TrackStop(PropertyGroup):
@@ -115,66 +111,89 @@ class DrawnPlace(PropertyGroup):
 class _Tracked:
     """Results and settings of tracking a region or the camera."""
 
-    confidence: labelled("Confidence", "How certain the tracked position is")(
-        FloatProperty, update=None, subtype="PERCENTAGE", default=100.0, min=0.0, max=100.0
+    confidence: FloatProperty(
+        name="Confidence",
+        description="How certain the tracked position is",
+        subtype="PERCENTAGE",
+        default=100.0,
+        min=0.0,
+        max=100.0,
     )
     stops: CollectionProperty(type=TrackStop)
-    motion: labelled("Motion", "Which channels Track and Follow key")(
-        EnumProperty, items=MOTIONS, options=set(), update=None, default="SCALE", translation_context=CONTEXT
+    motion: EnumProperty(
+        name="Motion",
+        description="Which channels Track and Follow key",
+        items=MOTIONS,
+        options=set(),
+        default="SCALE",
+        translation_context=CONTEXT,
     )
-    track_until: labelled("Until", "Timeline frame at which tracking stops; 0 is the end of the strip")(
-        IntProperty, update=None, options=set(), translation_context=CONTEXT
+    track_until: IntProperty(
+        name="Until",
+        description="Timeline frame at which tracking stops; 0 is the end of the strip",
+        options=set(),
+        translation_context=CONTEXT,
     )
-    track_all_keys: labelled(
-        "All Keys", "Keep a key at every tracked frame, in place of those that the motion needs within a pixel"
-    )(BoolProperty, update=None, options=set())
-    track_ends: labelled(
-        "Fade Out When Lost",
-        "Track keys a region's opacity, or the camera's influence, so that it fades where the track ends; "
+    track_all_keys: BoolProperty(
+        name="All Keys",
+        description="Keep a key at every tracked frame, in place of those that the motion needs within a pixel",
+        options=set(),
+    )
+    track_ends: BoolProperty(
+        name="Fade Out When Lost",
+        description="Track keys a region's opacity, or the camera's influence, so that it fades where the track ends; "
         "a region ends with its shot",
-    )(BoolProperty, update=None, default=True, options=set())
+        default=True,
+        options=set(),
+    )
 
 
 def location_property(description: str) -> object:
     limits = {"min": -MAX_DISTANCE, "max": MAX_DISTANCE}
-    return labelled("Location", description)(FloatVectorProperty, subtype="XYZ", size=2, **limits)
+    return labelled(FloatVectorProperty, "Location", description, subtype="XYZ", size=2, **limits)
 
 
 def rotation_property(description: str) -> object:
     limit = math.radians(MAX_DEGREES)
-    return labelled("Rotation", description)(FloatProperty, subtype="ANGLE", min=-limit, max=limit)
+    return labelled(FloatProperty, "Rotation", description, subtype="ANGLE", min=-limit, max=limit)
 
 
 def scale_property(description: str) -> object:
-    return labelled("Scale", description)(FloatProperty, default=1.0, min=-MAX_SCALE, max=MAX_SCALE)
+    return labelled(FloatProperty, "Scale", description, default=1.0, min=-MAX_SCALE, max=MAX_SCALE)
 
 
 @with_fields(
     model.Region, model.OutlineRegion, model.FileContent, model.RampContent, name={"set_transform": _region_renamed}
 )
 class ShutterRegion(_Tracked, PropertyGroup):
-    shutter: labelled("Shutter", "Name of the shutter that holds in the region")(StringProperty)
-    layer: labelled("Layer", "Annotation layer that holds the strokes")(StringProperty)
-    not_layer: labelled("Not This", "Annotation layer of strokes on what the subject is not")(StringProperty)
-    outline_layer: labelled("Outlines", "Annotation layer of outlines that overrule the model")(StringProperty)
+    shutter: labelled(StringProperty, "Shutter", "Name of the shutter that holds in the region")
+    layer: labelled(StringProperty, "Layer", "Annotation layer that holds the strokes")
+    not_layer: labelled(StringProperty, "Not This", "Annotation layer of strokes on what the subject is not")
+    outline_layer: labelled(StringProperty, "Outlines", "Annotation layer of outlines that overrule the model")
     # The first stroke makes it a subject, if a model finds one there.
     finds_subject: BoolProperty(options={"HIDDEN"})
     # Empty: drawings lie where the region has not moved. Otherwise, each lies where it was drawn.
     drawn: CollectionProperty(type=DrawnPlace)
     kind: choice("Type", "What says where the shutter holds", KINDS, translation_context=CONTEXT)
     matte: choice("From", "What the matte is", MATTE_SOURCES)
-    image: labelled("File", "Movie, image sequence or picture that is the matte")(PointerProperty, type=bpy.types.Image)
-    strip: labelled("Strip", "Identity of the strip that is the matte")(StringProperty)
-    strip_name: labelled("Strip", "Strip that is the matte")(
-        StringProperty, update=None, get=matte_content.strip_name, set=matte_content.choose_strip, options={"SKIP_SAVE"}
+    image: labelled(PointerProperty, "File", "Movie, image sequence or picture that is the matte", type=bpy.types.Image)
+    strip: labelled(StringProperty, "Strip", "Identity of the strip that is the matte")
+    strip_name: StringProperty(
+        name="Strip",
+        description="Strip that is the matte",
+        get=matte_content.strip_name,
+        set=matte_content.choose_strip,
+        options={"SKIP_SAVE"},
     )
-    mask: labelled("Mask", "Mask that is the matte")(PointerProperty, type=bpy.types.Mask)
-    channel_name: labelled("Channel Name", "Name of the channel in the EXR file")(StringProperty, maxlen=MAX_CHANNEL)
+    mask: labelled(PointerProperty, "Mask", "Mask that is the matte", type=bpy.types.Mask)
+    channel_name: labelled(StringProperty, "Channel Name", "Name of the channel in the EXR file", maxlen=MAX_CHANNEL)
     location: location_property("Distance from where the region was drawn, as a fraction of the picture")
     rotation: rotation_property("Rotation about the region's center")
     scale: scale_property("Scale about the region's center")
-    follow_clip: labelled("Clip", "Movie clip of the source's footage, in which something is tracked")(
-        PointerProperty, update=None, type=bpy.types.MovieClip
+    follow_clip: PointerProperty(
+        name="Clip",
+        description="Movie clip of the source's footage, in which something is tracked",
+        type=bpy.types.MovieClip,
     )
     follow_kind: choice("Follow Track", "What the region follows", FOLLOWED, update=None, default="TRACK")
     follow_object: StringProperty(
@@ -216,8 +235,8 @@ def _region_selected(effect: PropertyGroup, _context: Context) -> None:
 
 
 class ShutterBar(PropertyGroup):
-    weight: labelled("Weight", "Contribution of the bar's frame")(
-        FloatProperty, default=1.0, min=0.0, max=MAX_BAR, soft_max=1.0
+    weight: labelled(
+        FloatProperty, "Weight", "Contribution of the bar's frame", default=1.0, min=0.0, max=MAX_BAR, soft_max=1.0
     )
 
 
@@ -225,7 +244,7 @@ class ShutterBar(PropertyGroup):
 class Shutter(PropertyGroup):
     bars: CollectionProperty(type=ShutterBar)
     follow: choice("Exposure Moves With", "What the exposure moves with", FOLLOWS)
-    follow_region: labelled("Moved With", "Name of the region that the exposure moves with")(StringProperty)
+    follow_region: labelled(StringProperty, "Moved With", "Name of the region that the exposure moves with")
     # The last preset, and the effect's position when it was set (consistency.preset_of).
     preset: StringProperty(options={"HIDDEN"})
     preset_position: StringProperty(options={"HIDDEN"})
@@ -243,11 +262,20 @@ class _Settings:
     start: FloatProperty(name="Start", description="Timeline frame where the effect's content starts", options=set())
     camera: PointerProperty(name="Camera", description="Motion of what the camera sees", type=ShutterCamera)
     use_source_time: labelled(
-        "Custom Time", "Show the source at the time that is set here, in place of the strip's own timing"
-    )(BoolProperty, options=set())
+        BoolProperty,
+        "Custom Time",
+        "Show the source at the time that is set here, in place of the strip's own timing",
+        options=set(),
+    )
     source_time: labelled(
-        "Source Time", "Source frame that is shown, 1 is the source's first; keyed, it is a speed ramp"
-    )(FloatProperty, default=1.0, min=-MAX_FRAME, max=MAX_FRAME, soft_min=1.0)
+        FloatProperty,
+        "Source Time",
+        "Source frame that is shown, 1 is the source's first; keyed, it is a speed ramp",
+        default=1.0,
+        min=-MAX_FRAME,
+        max=MAX_FRAME,
+        soft_min=1.0,
+    )
 
 
 class ShutterEffect(_Settings, PropertyGroup):
