@@ -32,7 +32,7 @@ REVIEWED: dict[str, set[str]] = {
     },
     "track_region.py": {"_each", "track.<lambda>"},
     "outline_carrying.py": {"_Carrying._carry"},
-    "rendering/effect_source.py": {"_options", "find_steps", "find_steps.find", "steps_key"},
+    "rendering/effect_source.py": {"_options", "find_steps", "find_steps.find", "steps_key", "steps_of"},
     "rendering/pictures.py": {"_weights"},
     "rendering/render_job.py": {"where"},
     "rendering/session.py": {"RenderSession._ask", "RenderSession.forget.<lambda>", "broken_off"},

@@ -131,16 +131,22 @@ def find_steps(snapshot: Snapshot) -> int:
 
     def find() -> int:
         with snapshot.source.open() as medium:
-            return features.needed("steps_for")(medium, smooth, window, skip_repeats=skip_repeats)
+            return steps_of(medium, smooth, window, skip_repeats=skip_repeats)
 
     return 1 if smooth == 1 else _steps.ask(key, find, _KEPT)
+
+
+def steps_of(medium: FrameSource, smooth: int | str, window: int, *, skip_repeats: bool) -> int:
+    """Return the steps that the feature `smooth` finds for a source (smooth.steps_for), or 1 without that feature."""
+    for steps_for in features.each("steps_for"):
+        return int(steps_for(medium, smooth, window, skip_repeats=skip_repeats))
+    return 1
 
 
 def steps_key(snapshot: Snapshot) -> tuple:
     """Return what the steps depend on."""
     options = _options(snapshot)
-    step = options.step if any(features.each("SmoothSource")) else 1
-    return snapshot.source.key, step, options.window, options.skip_repeats
+    return snapshot.source.key, options.step, options.window, options.skip_repeats
 
 
 def _options(snapshot: Snapshot) -> Options:

@@ -11,7 +11,7 @@ from ....blender.commands import command_line
 from ....blender.data import preferences
 from ....blender.data.source_media import SourceSpec
 from ....blender.output import film_output
-from ....blender.rendering import render_job
+from ....blender.rendering import effect_source, render_job
 from ....core import atomic_write
 from ....core.frames.frame_source import FrameSource
 from ....core.model import outlines, presence
@@ -98,9 +98,7 @@ def _followed(
     effect = source_recipe.for_picture(medium.width / medium.height)
     subject: Any = effect.camera if index is None else effect.regions[index]
     options = source_recipe.options.at(1)
-    step = 1
-    for steps_for in features.each("steps_for"):
-        step = steps_for(medium, options.step, options.window, skip_repeats=options.skip_repeats)
+    step = effect_source.steps_of(medium, options.step, options.window, skip_repeats=options.skip_repeats)
     with ExitStack() as ends:
         moments = medium if step == 1 else features.needed("SmoothSource")(medium, step)
         shots = ends.enter_context(ShotSource(PrefetchSource(moments), step))
