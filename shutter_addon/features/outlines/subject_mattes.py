@@ -275,8 +275,9 @@ def _passing(places: carrying.Places, carried: np.ndarray, rest: np.ndarray) -> 
         carried: The subject's share, as motion has it.
         rest: How much a pixel's colors differ from those in its place before.
     """
-    off = [np.linalg.norm(places - carrying.affine(places, it), axis=2) for it in (carried < INSIDE, carried >= INSIDE)]
-    return np.clip((off[1] - off[0]) / WITH - 0.5, 0, 1) * np.exp(-np.square(rest / np.float32(SAME)))
+    apart = (places - carrying.affine(places, it) for it in (carried < INSIDE, carried >= INSIDE))
+    ground, own = (np.hypot(each[..., 0], each[..., 1]) for each in apart)
+    return np.clip((own - ground) / WITH - 0.5, 0, 1) * np.exp(-np.square(rest / np.float32(SAME)))
 
 
 def around(where: np.ndarray, room: float) -> Box:
