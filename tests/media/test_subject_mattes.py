@@ -13,7 +13,7 @@ from test_carrying import Footage
 from shutter_addon.core.messages import MediaError
 from shutter_addon.core.model import outlines
 from shutter_addon.features.outlines import subject_mattes
-from shutter_addon.features.outlines.subject_mattes import CarriedFile, MarkedSubject, Network
+from shutter_addon.features.outlines.subject_mattes import CarriedFile, Found, MarkedSubject, Network
 from shutter_addon.media.files import MODEL
 
 WIDTH, HEIGHT, COUNT = 240, 160, 5
@@ -118,6 +118,30 @@ def test_it_is_quiet_where_nothing_moves(opened):
     shown = [255 * mattes.read(frame) for frame in range(1, 4)]
     around = cv2.dilate(figures(0)[0].astype(np.uint8), np.ones((9, 9))) > 0
     assert max(np.abs(b - a)[around].mean() for a, b in pairwise(shown)) <= 1.5
+
+
+def test_what_moves_with_the_ground_does_not_become_a_part():
+    class Greedy:
+        def within(self, picture, box, share):
+            return np.maximum(figure, ground).astype(np.float32)
+
+    nothing = np.zeros((HEIGHT, WIDTH), np.float32)
+    subject = Found(figures(0)[0].astype(np.float32), nothing, 1.0)
+    for frame in range(1, 5):
+        figure, ground = figures(frame)[0], np.zeros((HEIGHT, WIDTH), bool)
+        ground[70:120, 100 - 2 * frame : 140 - 2 * frame] = True
+        subject, _still = subject_mattes.followed(Greedy(), picture(frame - 1), picture(frame), subject)
+        assert iou(subject.share, figure) > 0.85
+        beside = cv2.dilate(figure.astype(np.uint8), np.ones((13, 13))) == 0
+        assert subject.share[ground & beside].mean() < 0.1
+
+
+def test_a_chain_is_no_surer_than_its_keyframe(opened, monkeypatch):
+    share = figures(0)[0].astype(np.float32)
+    monkeypatch.setattr(subject_mattes, "found", lambda *_: Found(share, np.zeros_like(share), 0.1))
+    mattes = opened({0: [on_first(0)]})
+    assert iou(mattes.read(2), figures(2)[0]) > 0.85
+    assert mattes.confidence(2) == 0.1
 
 
 def test_models_that_cannot_be_used(tmp_path):

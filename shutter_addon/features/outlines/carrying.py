@@ -179,7 +179,7 @@ class _Footage:
         """
         picture = self.colors[frame]
         cover = _at(end.cover, joined)
-        others = [self.to(frame, end.frame), *(_affine(joined, where) for where in (cover < 0.5, cover >= 0.5))]
+        others = [self.to(frame, end.frame), *(affine(joined, where) for where in (cover < 0.5, cover >= 0.5))]
         places, least = joined, apart(picture, _at(self.colors[end.frame], joined))
         for other in others:
             differs = apart(picture, _at(self.colors[end.frame], other))
@@ -210,7 +210,7 @@ def apart(picture: np.ndarray, other: np.ndarray) -> np.ndarray:
     return cv2.blur(np.abs(picture - other).sum(axis=0), (5, 5))
 
 
-def _affine(places: Places, where: np.ndarray) -> Places:
+def affine(places: Places, where: np.ndarray) -> Places:
     """Fit an affine motion to the places in an area, and return the places that it gives in the whole picture.
 
     Args:

@@ -35,7 +35,8 @@ MULTIPLE, LEAST = 32, 5  # the network halves its picture five times: sides are 
 QUICK = 0.8  # share of the network's own size that is enough where it is known how the subject looked a frame before
 INSIDE = 0.5
 # Shares of their size: the room on each side of a subject that the network sees, and of strokes; and pixels at least.
-ROOM, CLOSE, LEAST_ROOM = 0.2, 1.5, 8
+ROOM, TIGHT, CLOSE, LEAST_ROOM = 0.2, 1.0, 1.5, 8
+ALONE = 0.95  # share of how sure the network is of more that is enough for a part near the stroke
 SURE = 0.9  # how sure the network has to be of what lies near strokes: else it looks at the whole picture
 TOUCHED = 0.5  # share of a stroke that a subject has to cover
 LARGEST = 0.9  # share of the picture from which on a mask is no subject
@@ -47,6 +48,9 @@ BELIEVED, MOST = (0.5, 0.7), 0.7
 # Of the confidence: how sure the network is, how far it agrees, from none to full; the pixels of the working picture
 # below which a subject is small; and how much it may rise from frame to frame, as what was lost seldom comes back.
 UNSURE, UNLIKE, SMALL, RISES = (0.85, 0.95), (0.5, 0.8), 3000, 0.05
+# By how many pixels of the working picture a place moves rather with the ground than with the subject, and how far its
+# colors may differ from before, in units of CIE Lab.
+WITH, SAME = 0.25, 8.0
 REST = 1.25  # how much more a pixel may differ from its place before than from where flow leads, to count as at rest
 _INPUT = re.compile(r"// <Input> CV_32FC1 \[1 x 3 x (\d+) x (\d+)\]")  # of OpenCV's description
 
@@ -149,13 +153,15 @@ def found(network: Network, picture: np.ndarray, on: np.ndarray, off: np.ndarray
         return None
     box = around(on, CLOSE)
     share = _parts_on(network.within(picture, box), on)
-    if (sure := _sure(share, on, box)) < SURE:  # the stroke is short beside the subject, or there is none
-        whole = _parts_on(network.answer(picture, QUICK), on)
-        everywhere = slice(0, on.shape[0]), slice(0, on.shape[1])
-        if (other := _sure(whole, on, everywhere)) > sure:
-            near = around(whole > INSIDE, ROOM)
-            share, sure = _parts_on(network.within(picture, near), on), other
-            sure = min(other, _sure(share, on, near))
+    if (sure := _sure(share, on, box)) < SURE:  # the subject is larger than it seemed or smaller, or there is none
+        whole = slice(0, on.shape[0]), slice(0, on.shape[1])
+        # What is alone near the stroke is rather the subject than more that is with it.
+        for other, least in ((around(on, TIGHT), ALONE), (whole, 1)):
+            seen = _parts_on(network.within(picture, other, QUICK), on)
+            if (surer := _sure(seen, on, other)) > least * sure:
+                near = around(seen > INSIDE, ROOM)
+                share = _parts_on(network.within(picture, near), on)
+                sure = min(surer, _sure(share, on, near))
     if sure <= 0:
         return None
     return without(Found(share, np.zeros_like(share), _confidence(share, sure)), picture, on, off)
@@ -239,6 +245,11 @@ def followed(network: Network, before: np.ndarray, picture: np.ndarray, subject:
     if not (carried > INSIDE).any():
         return Found(carried, excluded, 0.0), np.zeros_like(carried)
     answer = network.within(picture, around(carried > INSIDE, ROOM), QUICK) * (1 - excluded)
+    colors, old = carrying.lab(picture), carrying.lab(before)
+    differ, rest = (carrying.apart(colors, each) for each in (old, np.stack([flow.look(p, grid + back) for p in old])))
+    # What passes does not become a part of the subject, except where its edge may lie a pixel off.
+    passes = _passing(grid + back, carried, rest)
+    answer -= passes * np.maximum(answer - cv2.dilate(carried, np.ones((3, 3), np.uint8)), 0)
     _, parts = cv2.connectedComponents((answer > INSIDE).astype(np.uint8))
     sizes = np.bincount(parts.ravel())
     keep = np.bincount(parts.ravel(), weights=(carried > INSIDE).ravel()) >= SHARED * sizes
@@ -247,14 +258,26 @@ def followed(network: Network, before: np.ndarray, picture: np.ndarray, subject:
     agrees = float(np.minimum(answer, carried).sum() / max(np.maximum(answer, carried).sum(), 1e-6))
     sure = float(answer[answer > INSIDE].mean()) if (answer > INSIDE).any() else 0.0
     trust = MOST * _from(agrees, BELIEVED)
-    share = carried + np.float32(trust) * (answer - carried)
-    colors, old = carrying.lab(picture), carrying.lab(before)
+    # What passes does not stay a part either, if the network sees none there.
+    share = carried + np.maximum(np.float32(trust), passes * (answer < carried)) * (answer - carried)
     moved = np.hypot(back[..., 0], back[..., 1])
-    differ, rest = (carrying.apart(colors, each) for each in (old, np.stack([flow.look(p, grid + back) for p in old])))
     moved[differ <= REST * rest] = 0  # without structure, noise alone makes flow
     still = carrying.stillness(moved, colors, old)
     confidence = min(_confidence(share, sure, agrees), subject.confidence + RISES)
     return Found(share, excluded, confidence), still
+
+
+def _passing(places: carrying.Places, carried: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """Return how sure it is, 0 to 1, that each pixel (h, w) moves with the ground and not with the subject.
+
+    Args:
+        places: Where each pixel was in the frame before.
+        carried: The subject's share, as motion has it.
+        rest: How much a pixel's colors differ from those in its place before.
+    """
+    apart = (places - carrying.affine(places, it) for it in (carried < INSIDE, carried >= INSIDE))
+    ground, own = (np.hypot(each[..., 0], each[..., 1]) for each in apart)
+    return np.clip((own - ground) / WITH - 0.5, 0, 1) * np.exp(-np.square(rest / np.float32(SAME)))
 
 
 def around(where: np.ndarray, room: float) -> Box:
@@ -266,7 +289,7 @@ def around(where: np.ndarray, room: float) -> Box:
     return box_around(area, reach) or tight
 
 
-VERSION = 1  # raise it when mattes of the same strokes change
+VERSION = 2  # raise it when mattes of the same strokes change
 EXCLUDED = 1  # the level of what strokes say that the subject is not
 MIDDLE = 3.0  # the part of a span between two keyframes in which both of their chains count is a third
 STEEPER = 3.0
@@ -434,7 +457,8 @@ class SubjectMattes(CarriedMattes):
         what, still = followed(self._network, old, small, Found(share, excluded, sure))
         found_there = refined(picture, what.share)
         found_there += _fitted(still, matte) * (matte / np.float32(255) - found_there)
-        return found_there, what.excluded, what.confidence
+        # A chain is no surer of what it follows than its keyframe is.
+        return found_there, what.excluded, min(what.confidence, self._sure(end, end) or 0.0)
 
     def _pictures(self, frame: int) -> tuple[np.ndarray, np.ndarray]:
         """Return a frame's picture, and a smaller one. That of the frame before is remembered."""
