@@ -184,7 +184,7 @@ def found(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     for a, b in (halves, halves[::-1]):
         stopping.check()
         if min(height, width) >= SMALLEST:
-            way = _dis(a, b, stride=6, quick=True)
+            way = _dis(a, b, stride=5, quick=True)
         cost = cv2.blur(cv2.absdiff(a, look(b, grid(*a.shape) + way)).astype(np.float32), (3, 3))
         sides += [2 * way, cost]
     apart = STEP // 2
@@ -207,7 +207,7 @@ def _dis(first: np.ndarray, second: np.ndarray, stride: int, smoothness: float =
         second: Like `first`.
         stride: Pixels from a patch to the next.
         smoothness: Of the vectors (OpenCV's alpha).
-        quick: Refine vectors less. With a stride of 6, this takes a fourth of the time, and moments look as good.
+        quick: Refine vectors less. With a stride of 5, this takes a third of the time, and moments look as good.
     """
     # A new one each time: it keeps buffers, which threads must not share.
     dis = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
@@ -216,7 +216,7 @@ def _dis(first: np.ndarray, second: np.ndarray, stride: int, smoothness: float =
     dis.setVariationalRefinementAlpha(smoothness)
     if quick:
         dis.setGradientDescentIterations(12)
-        dis.setVariationalRefinementIterations(1)
+        dis.setVariationalRefinementIterations(2)
     height, width = first.shape
     beyond = max(SMALLEST - height, 0), max(SMALLEST - width, 0)
     wide = (cv2.copyMakeBorder(each, 0, beyond[0], 0, beyond[1], cv2.BORDER_REPLICATE) for each in (first, second))
