@@ -3,7 +3,7 @@
 import pytest
 
 from shutter_addon.core.model import keyframes, presence
-from shutter_addon.core.model.presence import Stop
+from shutter_addon.core.model.presence import Gap, Stop
 
 COVERED, BEHIND = Stop(50, True), Stop(9, False)
 TRACKED = range(10, 50)
@@ -42,15 +42,12 @@ def test_where_the_editor_has_put_it_all_of_it_counts():
         assert found[50] == 0
 
 
-def test_a_gap_on_the_way_to_another_key():
-    """Both ways there end before they meet."""
+def test_fades_end_before_they_meet():
+    """On the way to another key, and between gaps that are close."""
     found = counts([*range(10, 31), *range(40, 60)], [Stop(31, True), Stop(39, True)], [10, 59])
     assert found[31:40] == [0.0] * 9
     assert found[26:31] == pytest.approx([1, 0.8, 0.6, 0.4, 0.2])
     assert found[40:45] == pytest.approx([0.2, 0.4, 0.6, 0.8, 1])
-
-
-def test_gaps_that_are_close_leave_room_for_each_other():
     found = counts([*range(10, 30), *range(33, 37), *range(40, 60)], [Stop(30, True), Stop(37, True)], [15])
     assert found[30:33] == [0.0] * 3
     assert found[37:40] == [0.0] * 3
@@ -60,4 +57,4 @@ def test_gaps_that_are_close_leave_room_for_each_other():
 def test_a_jump_from_which_it_goes_on_is_one_frame_long():
     found = counts(range(60), [Stop(30, True)], [0], fade=10)
     assert found[20:41] == pytest.approx([abs(frame - 30) / 10 for frame in range(20, 41)])
-    assert presence.gaps(range(60), [Stop(30, True)]) == [presence.Gap(30, 30, False, False)]
+    assert presence.gaps(range(60), [Stop(frame, True) for frame in (30, 32, 33)]) == [Gap(30, 30), Gap(32, 33)]
