@@ -329,6 +329,7 @@ def test_deep_and_linear_pictures_look_alike(subject):
     plain, *others = (Footage(each, lambda frame: frame).picture(0) for each in (Film([subject]), deep, linear))
     for other in others:
         assert np.abs(plain.astype(int) - other).max() <= 1
+    assert Footage(Film([subject.repeat(3, 0).repeat(3, 1)]), None).size == (960, 540)
 
 
 class CutOut(Film):
