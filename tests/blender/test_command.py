@@ -85,6 +85,9 @@ def test_weights_have_a_channel_for_each_layer(command_here, film, tmp_path):
     assert np.array_equal(gone["S0.001"], there["S0.001"])
     assert not gone["Gone"].any()
     assert (there["S0"] == 1).all()
+    data = recipe(4, [1] * 4, regions=[regions[1] | {"shutter": "S0"}])
+    command_here(film[0], *options[:2], "--weights", tmp_path / "one", "--frames", "3", recipe=data)
+    assert not OpenImageIO.ImageBuf(str(tmp_path / "one" / "0003.exr")).get_pixels()[..., 0].any()
 
 
 def test_chunks_and_order_change_no_bit(command_here, film, tmp_path):

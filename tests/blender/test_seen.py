@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from support import sequencer, started, write_frames
+from support import sequencer, started, write_frames, write_tone
 
 from shutter_addon.blender.data import selection
-from shutter_addon.blender.editing import reconcile, shown_annotations, undelete
+from shutter_addon.blender.editing import add_effect, reconcile, shown_annotations, undelete
 
 pytestmark = pytest.mark.usefixtures("no_exception")
 
@@ -37,7 +37,7 @@ def source_of(edit, effect):
     return next(s for s in edit.sequence_editor.strips_all if s.virtual_shutter_source == effect.source)
 
 
-def test_after_a_cut_the_half_that_is_selected_is_edited_else_that_under_the_playhead(bpy, edit, effect):
+def test_after_a_cut_the_half_that_is_selected_is_edited_else_that_under_the_playhead(bpy, edit, effect, tmp_path):
     left = strip_of(edit, effect)
     right = left.split(21, "SOFT")  # and the source, which is connected
     bpy.context.view_layer.update()
@@ -52,6 +52,10 @@ def test_after_a_cut_the_half_that_is_selected_is_edited_else_that_under_the_pla
     selection.choose(edit, left)
     left.select = False
     assert active(bpy) == right
+    write_tone(tmp_path / "a.wav")
+    edit.sequence_editor.active_strip = sound = edit.sequence_editor.strips.new_sound("", str(tmp_path / "a.wav"), 9, 1)
+    add_effect.connect(edit, [left, source_of(edit, effect), sound])
+    assert selection.active_strip(bpy.context) == source_of(edit, effect)
 
 
 def test_of_effects_on_top_of_each_other_the_active_one_is_edited(bpy, edit, effect, tmp_path):

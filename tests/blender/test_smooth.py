@@ -279,6 +279,7 @@ def test_a_dragged_playhead_and_a_preview_that_plays_wait_for_no_flow(bpy, monke
     monkeypatch.setattr(render_job, "operators_running", lambda: {"ANIM_OT_change_frame"})
     assert not previews._detail(bpy.context, look).smooth  # likewise
     monkeypatch.setattr(previews.looking, "late_until", 0.0)
+    assert not previews.is_read(bpy.context)  # as nothing does without a window
 
 
 # Files of format 1

@@ -170,10 +170,11 @@ def test_a_window_that_slides_reads_one_frame(device):
     assert source.reads == list(range(17))
     renderer.picture(Request(0, moment))
     assert source.reads == [*range(17), 0]
-    source.reads.clear()
     bars = np.eye(16)[[5, 6]].sum(axis=0)[None]  # frames that no shutter exposes are not read
-    Renderer(device, source).picture(Request(3, FrameState(Options(16), bars)))
-    assert source.reads == [8, 9]
+    for edges in ("hold", "shorten"):
+        source.reads.clear()
+        Renderer(device, source).picture(Request(2, FrameState(Options(16, "center", edges=edges), bars)))
+        assert source.reads == [0, 1]
 
 
 @pytest.mark.parametrize("alpha", ["straight", "premultiplied"])

@@ -6,7 +6,7 @@ from unittest import mock
 
 import numpy as np
 import pytest
-from test_composition import LEVEL, Footage, footage, state
+from test_composition import LEVEL, SHAPES, Footage, footage, state
 
 from shutter_addon.compute import layer_frames
 from shutter_addon.compute.gpu import GPUCompositor
@@ -171,8 +171,7 @@ def test_what_was_not_exposed_comes_from_the_nearest_clear_frame(device):
     bars = np.eye(3, 4)[[0, 0, 0]]
     moment, _ = with_layers(FrameState(Options(4), bars), matte, opacities=(1.0,))
     moment = dataclasses.replace(moment, layers=dataclasses.replace(moment.layers, shutters=(2,)))
-    renderer = Renderer(device, source, MatteValues(*SIZE))
-    picture = renderer.picture(Request(SHOWN, moment))
+    renderer, picture = drawn(device, source, moment)
     inside = matte[SHOWN] > 0
     assert_near(picture, source.linear()[SHOWN])
     # Of what is not quite covered, the plate makes up what lacks.
@@ -195,12 +194,13 @@ def test_nothing_clear_within_reach_is_filled_smoothly(device):
     matte = np.zeros((COUNT, *SIZE[::-1]))
     matte[:, 5:15, 5:20] = 1
     source = of_two_colours(matte)
-    moment, _ = with_layers(FrameState(Options(4), np.ones((3, 4))), matte, opacities=(0.95,))
-    renderer = Renderer(device, source, MatteValues(*SIZE))
-    picture = renderer.picture(Request(SHOWN, dataclasses.replace(moment, options=Options(4, plate_reach=3))))
+    options = Options(4, plate_reach=3, exposure="weighted", aggregate=2)
+    moment, _ = with_layers(FrameState(options, np.ones((3, 4)), SHAPES, 8.0), matte, opacities=(0.95,))
+    _, picture = drawn(device, source, moment)
     around = source.linear()[0, 0, 0]
     behind = (0.05 * source.linear()[SHOWN] + (layering.CLEAR - 0.05) * around) / layering.CLEAR
     expected = np.where(matte[SHOWN][..., None] > 0, 0.95 * source.linear()[SHOWN] + 0.05 * behind, around)
+    expected[..., :3] /= 2  # half of the reference exposure
     assert_near(picture, expected)
 
 

@@ -11,9 +11,7 @@ def test_short_sentences_stay_and_long_ones_keep_the_place_and_the_reason():
     assert len(said) == LONGEST
     assert said.startswith("Virtual Shutter: regions[3].strokes: xxx")
     assert said.endswith("xxx, not a number")
-
-
-def test_what_no_terminal_shows_is_escaped():
+    # What no terminal shows is escaped.
     assert sentence("a\x00b\x1b[31mc") == r"a\x00b\x1b[31mc"
     assert sentence("name\udcff.png: gone\nagain") == r"name\udcff.png: gone again"
 

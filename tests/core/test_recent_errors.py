@@ -13,6 +13,7 @@ from shutter_addon.media.files import check_file
 @pytest.fixture(autouse=True)
 def _nothing_told(monkeypatch):
     monkeypatch.setattr(recent_errors, "_lines", [])  # private: what other tests told
+    monkeypatch.setattr(recent_errors, "_start", -1e9)
 
 
 def missing(folder):
@@ -47,19 +48,15 @@ def test_lines_and_errors_of_other_code_are_not_kept():
     assert recent_errors.last() == []
 
 
-def test_an_error_that_nobody_expected_is_kept_without_what_it_says():
+def test_an_error_that_nobody_expected_is_kept_without_what_it_says(monkeypatch):
+    """One in a thread that nobody waits for is printed all the same, as Python does."""
+    printed = []
+    monkeypatch.setattr(threading, "excepthook", lambda raised: printed.append(raised.exc_type))
     with pytest.raises(TypeError) as raised:
         check_file(lambda: "a name")
     recent_errors.exception(raised.value)
-    (kept,) = recent_errors.last()
-    assert re.fullmatch(r"\d+ s: TypeError \[media/files\.py:\d+ check_file\]", kept)
-
-
-def test_what_a_thread_raises_that_nobody_waits_for(monkeypatch):
-    """It is printed all the same, as Python does."""
-    printed = []
-    monkeypatch.setattr(threading, "excepthook", lambda raised: printed.append(raised.exc_type))
     threads.daemon(check_file, lambda: "a name").join()
     assert printed == [TypeError]
-    (kept,) = recent_errors.last()
-    assert re.fullmatch(r"\d+ s: TypeError \[.* check_file < .*\]", kept)
+    expected, in_thread = recent_errors.last()
+    assert re.fullmatch(r"\d+ s: TypeError \[media/files\.py:\d+ check_file\]", expected)
+    assert re.fullmatch(r"\d+ s: TypeError \[.* check_file < .*\]", in_thread)

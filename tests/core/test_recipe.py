@@ -1,6 +1,7 @@
 import copy
 import json
 import os
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -28,8 +29,6 @@ EXAMPLE = {
 }
 EXAMPLE |= {"position": "start", "interpolation": "displacement", "light": "linear", "exposure": "normalized"}
 EXAMPLE |= {"edges": "hold", "aggregate": 1, "border": False, "stop_at_cuts": True}
-
-
 MATTE = {"shutter": "Sharp", "kind": "matte", "path": "mattes/0001.png"}
 RAMP = {"shutter": "Sharp", "kind": "ramp", "ramp": "linear"}
 
@@ -41,6 +40,7 @@ def test_mattes_and_ramps():
     regions += [RAMP | {"ramp": "luminance"}]
     parsed = recipe_file.parse(json.dumps(EXAMPLE | {"regions": regions}))
     assert comes_back(parsed)
+    assert recipe.contents(recipe.moved(parsed, Path("a/b"), Path("a")))[0].path == "b/mattes/0001.png"
     moment = with_contents(parsed.for_picture(1), lambda region: type(region.content).__name__).at(3)
     assert len(moment.shapes) == 1
     of_source, of_timeline, ramp, luminance = moment.mattes

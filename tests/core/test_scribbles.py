@@ -41,12 +41,9 @@ def test_a_thick_line_of_many_points_is_soon_drawn():
     assert (scribbles.rasterise([Shape(0, "line", 1000.0, (stroke,))], 320, 180) == 1).all()
 
 
-def test_a_lasso_that_holds_no_pixel_centre_still_marks_its_place():
+def test_a_lasso_that_holds_no_pixel_centre_marks_its_place_and_one_that_crosses_itself_has_no_hole():
     thin = np.array([[0.1, 0.5], [0.9, 0.501], [0.5, 0.5005]])
     assert (scribbles.rasterise([Shape(0, "lasso", 0, (thin,))], 20, 20) == 1).any()
-
-
-def test_a_lasso_that_crosses_itself_has_no_hole():
     turns = np.linspace(0, 4 * np.pi, 60)
     spiral = np.stack([0.5 + 0.3 * np.cos(turns), 0.5 + 0.3 * np.sin(turns)], axis=1)
     assert scribbles.rasterise([Shape(0, "lasso", 0, (spiral,))], 50, 50)[25, 25] == 1

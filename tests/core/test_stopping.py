@@ -20,6 +20,7 @@ def test_a_thread_is_told_what_was_said_on_it():
 
 
 def test_a_slice_ends_work_and_knows_what_is_kept():
+    assert not stopping.Slices().next("key", 60, 60)()
     memo, over, endless = LastValue(), stopping.Slice(-math.inf, -math.inf), stopping.Slice(math.inf, math.inf)
     with stopping.once(over), pytest.raises(stopping.StoppedError):
         memo.get("key", stopping.check)
@@ -32,12 +33,8 @@ def test_a_slice_ends_work_and_knows_what_is_kept():
     with stopping.once(again):
         assert memo.get("key", lambda: 2) == 1
     assert not again.has_kept, "it was there"
-
-
-def test_a_slice_ends_soon_once_something_is_kept():
-    memo, slice_ = LastValue(), stopping.Slice(-math.inf, math.inf)
-    with stopping.once(slice_):
+    with stopping.once(stopping.Slice(-math.inf, math.inf)):  # it ends once something is kept
         stopping.check()
-        memo.get("key", lambda: 1)
+        memo.get("other", lambda: 1)
         with pytest.raises(stopping.StoppedError):
             stopping.check()

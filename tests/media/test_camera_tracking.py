@@ -93,14 +93,11 @@ def test_a_shaken_camera_is_found_behind_a_subject_that_covers_most_of_it():
     assert max(error(mistaken, truth, 6, frame) for frame in mistaken) > 10
 
 
-def test_a_shaken_camera_does_not_drift():
+def test_a_shaken_camera_does_not_drift_and_one_that_pans_is_found_from_later_frames():
+    """The second leaves all that the first frame has; from each frame to the tenth behind it, it is right."""
     source, truth = film(24)
     found, _ = tracked(source)
     assert max(error(found, truth, 0, frame) for frame in found) < 0.15
-
-
-def test_a_camera_that_pans_is_found_from_later_frames():
-    """It leaves all that the first frame has; from each frame to the tenth behind it, it is right."""
     source, truth = film(28, pan=20)
     found, faults = tracked(source)
     assert (faults, len(found)) == ({}, 28)

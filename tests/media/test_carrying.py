@@ -159,6 +159,8 @@ def test_it_is_quiet_where_nothing_moves():
     mattes = [each.matte.astype(float) for each in carrying.carried(pictures.__getitem__, *drawn, range(1, 8))]
     changes = [np.abs(after - before)[truth(4) > 0].mean() for before, after in pairwise(mattes)]
     assert np.mean(changes) <= 1
+    strong = np.float32([0, 1e6])[:, None, None, None] * np.ones((3, 9, 9), np.float32)
+    assert carrying.stillness(np.zeros((9, 9)), *strong) == pytest.approx(carrying.QUIET * np.exp(-1 / 4), rel=1e-4)
 
 
 def test_mattes_are_kept(carried, footage, tmp_path):

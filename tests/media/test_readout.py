@@ -30,14 +30,11 @@ def test_a_readout_is_found(share):
     assert found == pytest.approx(share, rel=0.05, abs=0.01)
 
 
-def test_of_a_camera_that_shakes():
+def test_of_a_camera_that_shakes_and_of_things_that_pass_each_at_its_own_speed():
     def shaken(t):
         return 9 * np.sin(1.1 * t) + 12 * np.sin(0.37 * t + 1) + 5 * np.sin(1.9 * t + 2)
 
     assert readout.of_pictures(list(pictures(0.5, shaken, noise=2))) == pytest.approx(0.5, rel=0.1)
-
-
-def test_of_things_that_pass_each_at_its_own_speed():
     upper, lower = (list(pictures(0.3, lambda t, s=s: s * np.sin(t / 3))) for s in (30, -18))
     both = [np.where(np.arange(HEIGHT)[:, None] < HEIGHT / 2, a, b) for a, b in zip(upper, lower, strict=True)]
     assert readout.of_pictures(both) == pytest.approx(0.3, rel=0.1)

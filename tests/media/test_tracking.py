@@ -14,6 +14,7 @@ from shutter_addon.core.model.keyframes import Constant, Keys
 from shutter_addon.core.model.motions import Similarity
 from shutter_addon.features.tracking import tracking
 from shutter_addon.media import open_source
+from shutter_addon.media.cuts import ShotSource
 from shutter_addon.media.footage import Footage
 
 ASSETS = Path(__file__).parents[2] / "assets"
@@ -320,6 +321,9 @@ def test_backward_a_source_is_read_upwards(subject, ground):
     source, _ = film(subject, ground, lambda t: (t,), 10, 9)
     followed(source, "line", 9)
     assert source.asked == [9, *range(9)]
+    source.asked.clear()
+    followed(ShotSource(source), "line", 0)  # which also looks for cuts
+    assert source.asked[2:] == [*range(10)]
 
 
 def test_deep_and_linear_pictures_look_alike(subject):
@@ -329,6 +333,7 @@ def test_deep_and_linear_pictures_look_alike(subject):
     plain, *others = (Footage(each, lambda frame: frame).picture(0) for each in (Film([subject]), deep, linear))
     for other in others:
         assert np.abs(plain.astype(int) - other).max() <= 1
+    assert Footage(Film([subject.repeat(3, 0).repeat(3, 1)]), None).size == (960, 540)
 
 
 class CutOut(Film):
