@@ -1,4 +1,4 @@
-"""Records of a recipe's JSON for cattrs, and their conversion to and from effects.
+"""Records of a recipe's JSON, which recipe_file.py reads, and their conversion to and from effects.
 
 A record has the fields that the model declares, and special ones: bars, strokes and keys. Frames are timeline frames; 1
 is the strip's first. Points are fractions of the picture, y up.
@@ -171,7 +171,7 @@ KINDS = {
     "ramp": RampRecord,
     "subject": SubjectRecord,
 }
-# cattrs chooses one of KINDS by the field `kind`.
+# One of KINDS by the field `kind`.
 AnyRegionRecord: Any = RegionRecord | OutlineRecord | MatteRecord | RampRecord | SubjectRecord
 RecipeRecord: Any = _record(
     "RecipeRecord",
