@@ -133,10 +133,8 @@ class MovieSource(FrameSource):
         """Turn errors into a MediaError that names the frame."""
         try:
             yield
-        except av.error.FFmpegError as error:
+        except (av.error.FFmpegError, MediaError) as error:
             raise MediaError(f"frame {index} of {self.path.name} cannot be decoded: {reason(error)}") from error
-        except MediaError as error:
-            raise MediaError(f"frame {index} of {self.path.name} cannot be decoded: {error}") from error
 
     def _matrix(self, frame: av.VideoFrame) -> Matrix | None:
         """Return the matrix from the frame's planes to RGB, or None if it needs more conversions."""
