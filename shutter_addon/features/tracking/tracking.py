@@ -297,8 +297,8 @@ class Track(ABC):
                 are then yielded again, blended with tracking back from the anchor.
 
         Raises:
-            TrackingError: at once, if nothing can be tracked
-            MediaError: while iterating, if a frame cannot be read
+            TrackingError: nothing can be tracked
+            MediaError: a frame cannot be read
         """
         self._footage, self._motion = footage, motion
         centres = {frame: self._subject.centre(frame) for frame in frames}
@@ -310,7 +310,7 @@ class Track(ABC):
         if len(frames) < 2:
             raise TrackingError(ALONE)
         self._tracker(start)
-        return self._both_ways(start, range(min(frames), max(frames) + 1), {*anchors} - {start})
+        yield from self._both_ways(start, range(min(frames), max(frames) + 1), {*anchors} - {start})
 
     @abstractmethod
     def _tracker(self, start: int) -> tuple[Pursuit, float]:

@@ -57,18 +57,19 @@ def run(arguments: Namespace) -> None:
     scene.frame_set(arguments.frame)
     _scene, effect, strip = selection.seen(scene)
     index, subject = (None, recipe.CAMERA) if arguments.camera else (_region_index(arguments, effect), arguments.region)
-    moving, motion = selection.moving(effect, index), arguments.motion.upper()
+    moving = selection.moving(effect, index)
+    moving.motion, moving.track_all_keys = arguments.motion.upper(), arguments.all_keys
     moving.track_ends = not arguments.hold
-    _forget_keys(MotionKeys(effect, index, motion), frames)
-    steps = track_region.track(scene, effect, strip, index, frames, motion, all_keys=arguments.all_keys)
+    keys = MotionKeys(effect, index, moving.motion)
+    _forget_keys(keys, frames)
     try:
         with film_output.progress(len(frames), "frame") as moved:
-            for _ in steps:
+            for _ in track_region.track(scene, effect, strip, index, frames):
                 moved()
     except EffectError as error:
         raise EffectError(f"{subject}: {error}") from None
     stops = sorted((round(effect.start + stop.frame), stop.fault) for stop in moving.stops)
-    sure = zip(*(each.tolist() for each in MotionKeys(effect, index, motion).confidence()), strict=True)
+    sure = zip(*(each.tolist() for each in keys.confidence()), strict=True)
     report = {
         **({"camera": True} if arguments.camera else {"region": arguments.region}),
         "frame": arguments.frame,
