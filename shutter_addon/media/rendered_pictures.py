@@ -89,10 +89,9 @@ def is_whole_picture(path: Path) -> bool:
     image = ImageInput.open(check_name(path))
     if image is None:
         return False
-    spec = image.spec()
-    last = image.read_scanline(spec.y + spec.height - 1, 0, "half")
-    image.close()
-    return last is not None
+    with closing(image):
+        spec = image.spec()
+        return image.read_scanline(spec.y + spec.height - 1, 0, "half") is not None
 
 
 def is_whole_movie(path: Path, count: int) -> bool:

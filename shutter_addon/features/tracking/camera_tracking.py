@@ -158,7 +158,6 @@ class _Pursuit:
         return FoundMotion(match.motion.after(motion) if match else known, tracking.confidence(match, picture))
 
     def _anchor_at(self, frame: int, motion: Similarity) -> tuple[Part, int, Similarity] | None:
-        try:
+        with suppress(TrackingError):
             return self._part_at(frame), frame, motion
-        except TrackingError:
-            return None
+        return None
