@@ -18,7 +18,7 @@ def with_contents(effect, files=lambda _region: None):
 
     `files` gives the file of a matte, the source's luminance for a ramp, and the mattes of an outline or a subject.
     """
-    return effect.with_parts([_with_content(region, files) for region in effect.regions])
+    return effect.with_regions([_with_content(region, files) for region in effect.regions])
 
 
 def _with_content(region, files):

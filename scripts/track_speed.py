@@ -20,7 +20,6 @@ import numpy as np
 from comparing import ROOT, write_rows
 
 from shutter_addon.core.model.effect import Drawings, Moves, Region
-from shutter_addon.core.model.keyframes import Constant
 from shutter_addon.features.tracking import tracking
 from shutter_addon.media import PrefetchSource, open_source
 from shutter_addon.media.cuts import ShotSource
@@ -44,7 +43,7 @@ def scaled(footage: Path, size: tuple[int, int], folder: Path) -> Path:
 
 def region(kind: str, aspect: float) -> Region:
     drawings = Drawings(kind, (0.0,), ([np.array(REGIONS[kind])],), ("linear",), aspect)
-    return Region(Moves(), kind, 0, Constant(kind), Constant(0.02), drawings)
+    return Region(Moves(), kind=kind, shutter=0, drawings=drawings)
 
 
 def decode(path: Path, _kind: str) -> dict:

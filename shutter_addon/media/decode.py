@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import heapq
 import math
-import struct
 from collections.abc import Generator, Iterator
 from fractions import Fraction
 from pathlib import Path
@@ -310,31 +309,20 @@ def fraction(rational: AVRational | Fraction | None) -> Fraction:
 
 
 def reason(error: Exception) -> str:
-    """Return libav's message of an error, for use inside a sentence."""
+    """Return the message of an error, of libav's or of ours, for use inside a sentence."""
     text = (getattr(error, "strerror", None) or str(error)).strip()
     return text[:1].lower() + text[1:]
 
 
-def _tags(codec: VideoCodecContext) -> tuple[int, bool, int]:
+def _tags(codec: VideoCodecContext) -> tuple[int, bool]:
     """Return a movie's tags that Blender reads once, for all frames.
 
     Returns:
-        The YUV matrix by its number in ITU-T H.273, whether samples have full range, and the quarter turns
-        counterclockwise by which pictures are stored.
+        The YUV matrix by its number in ITU-T H.273, and whether samples have full range.
     """
     # libswscale assumes BT.601 for matrices that it does not know.
     space = {1: 1, 4: 4, 7: 7, 9: 9, 10: 9}.get(int(codec.colorspace), 5)
-    side_data = getattr(codec, "coded_side_data", {})  # missing before PyAV 19: pictures are not turned then
-    return space, codec.color_range == ColorRange.JPEG, _turns(side_data.get("display_matrix"))
-
-
-def _turns(display_matrix: bytes | None) -> int:
-    """Return FFmpeg's av_display_rotation_get in quarter turns, 0 if the matrix is empty or missing."""
-    if display_matrix is None or len(display_matrix) != 36:
-        return 0
-    a, b, _, c, d, *_ = struct.unpack("=9i", display_matrix)
-    across, down = math.hypot(a, c), math.hypot(b, d)
-    return round(math.atan2(b / down, a / across) / (math.pi / 2)) % 4 if across and down else 0
+    return space, codec.color_range == ColorRange.JPEG
 
 
 def _video_stream(container: InputContainer, name: str, number: int) -> VideoStream:

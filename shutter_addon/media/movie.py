@@ -29,8 +29,6 @@ from .reduced import reduced, reduced_size
 SCALER = Interpolation.POINT | Interpolation.ACCURATE_RND | Interpolation.FULL_CHR_H_INT
 REDUCER = Interpolation.AREA | Interpolation.ACCURATE_RND | Interpolation.FULL_CHR_H_INT  # for smaller frames
 _NO_COUNT = 1 << 31  # Blender cannot count so many frames; a header that claims them is damaged
-# Whether frames have the position of chroma: since PyAV 19.
-_TELLS_CHROMA = hasattr(av.VideoFrame, "chroma_location")
 _UNSPECIFIED = 2  # in ITU-T H.273
 # Formats whose fields Blender interpolates. It blurs all others.
 _WITH_FIELDS = frozenset({"yuv420p", "yuvj420p", "yuv422p", "yuvj422p", "yuv444p", "yuv411p", "gray"})
@@ -77,7 +75,8 @@ class MovieSource(FrameSource):
             raise MediaError(f"{self.path.name}: its length is unknown; put it into an MP4 or MKV file first")
         self.has_audio = bool(file.container.streams.audio)
         self._step = float(1 / (self.fps * self._reader.time_base))
-        self._space, self._is_full, self._turns = self._reader.tags
+        self._space, self._is_full = self._reader.tags
+        self._turns = round(first.rotation / 90) % 4  # counterclockwise, until pictures are upright
         self._range = ColorRange.JPEG if self._is_full else ColorRange.MPEG
         filmed = first.width, first.height
         size = reduced_size(first.width, self._divisor), reduced_size(first.height, self._divisor)
@@ -126,8 +125,7 @@ class MovieSource(FrameSource):
             frame.colorspace, frame.color_range = self._space, self._range
         # Colors are converted later. As in Blender, libswscale assumes the default position of chroma.
         frame.color_primaries = frame.color_trc = _UNSPECIFIED
-        if _TELLS_CHROMA:
-            frame.chroma_location = 0
+        frame.chroma_location = 0
         return frame
 
     @contextmanager
@@ -135,10 +133,8 @@ class MovieSource(FrameSource):
         """Turn errors into a MediaError that names the frame."""
         try:
             yield
-        except av.error.FFmpegError as error:
+        except (av.error.FFmpegError, MediaError) as error:
             raise MediaError(f"frame {index} of {self.path.name} cannot be decoded: {reason(error)}") from error
-        except MediaError as error:
-            raise MediaError(f"frame {index} of {self.path.name} cannot be decoded: {error}") from error
 
     def _matrix(self, frame: av.VideoFrame) -> Matrix | None:
         """Return the matrix from the frame's planes to RGB, or None if it needs more conversions."""
@@ -167,14 +163,14 @@ class MovieSource(FrameSource):
             return self._reformatted(self._to_packed, frame, pix_fmt).to_ndarray()
 
     def _reformatted(self, by: VideoReformatter, frame: av.VideoFrame, pix_fmt: str) -> av.VideoFrame:
-        if frame.interlaced_frame or not _TELLS_CHROMA:  # libswscale would scale each field by itself
+        if frame.interlaced_frame:  # libswscale would scale each field by itself
             frame = _untold(frame)
         samples = ColorRange.JPEG if frame.format.is_rgb else frame.color_range
         width, height = self._size
         return by.reformat(frame, width, height, pix_fmt, None, None, self._scaler, samples, ColorRange.JPEG)
 
     def _upright(self, picture: np.ndarray) -> np.ndarray:
-        return np.require(np.rot90(picture, -self._turns), requirements=["C", "W"])
+        return np.require(np.rot90(picture, self._turns), requirements=["C", "W"])
 
     def close(self) -> None:
         """Close the file and end all threads. A later read opens it again."""
@@ -184,7 +180,7 @@ class MovieSource(FrameSource):
 
 
 def _untold(frame: av.VideoFrame) -> av.VideoFrame:
-    """Return a copy of a frame without marks for fields and for the position of chroma, which PyAV cannot clear."""
+    """Return a copy of a frame without marks for fields, which PyAV cannot clear."""
     copy = av.VideoFrame(frame.width, frame.height, frame.format.name)
     for own, plane in zip(frame.planes, copy.planes, strict=True):
         rows = np.frombuffer(own, np.uint8)[: own.height * own.line_size].reshape(own.height, own.line_size)

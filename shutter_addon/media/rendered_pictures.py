@@ -7,7 +7,7 @@ from contextlib import closing, suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from OpenImageIO import ImageInput, geterror
+from OpenImageIO import ImageBuf, ImageBufAlgo, ImageInput, geterror
 
 from ..core.farm import job_file
 from .files import check_name, pyav_missing
@@ -62,13 +62,8 @@ def read(path: Path, edit: str | None = None) -> RenderedPicture | None:
 
 def is_transparent(path: Path) -> bool:
     """Return whether any pixel is not opaque. The last channel is alpha. False if the picture cannot be read."""
-    image = ImageInput.open(check_name(path))
-    if image is None:
-        return False
-    with closing(image):
-        last = image.spec().nchannels - 1
-        alpha = image.read_image(0, 0, last, last + 1, "float")
-        return alpha is not None and bool(alpha.min() < 1)
+    least = ImageBufAlgo.computePixelStats(ImageBuf(check_name(path))).min
+    return bool(least) and least[-1] < 1
 
 
 def _is_sound_png(path: Path) -> bool:
@@ -94,10 +89,9 @@ def is_whole_picture(path: Path) -> bool:
     image = ImageInput.open(check_name(path))
     if image is None:
         return False
-    spec = image.spec()
-    last = image.read_scanline(spec.y + spec.height - 1, 0, "half")
-    image.close()
-    return last is not None
+    with closing(image):
+        spec = image.spec()
+        return image.read_scanline(spec.y + spec.height - 1, 0, "half") is not None
 
 
 def is_whole_movie(path: Path, count: int) -> bool:

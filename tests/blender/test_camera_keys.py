@@ -90,7 +90,7 @@ TRUTH = {11 + index: seen_from(index) for index in range(COUNT)}
 
 def test_the_camera_is_tracked_behind_what_regions_cover(bpy, effect):
     edit, effect, strip = active(bpy)
-    assert set(track_region.track(edit, effect, strip, None, range(11, 23), "SCALE")) == TRUTH.keys() - {16}
+    assert set(track_region.track(edit, effect, strip, None, range(11, 23))) == TRUTH.keys() - {16}
     assert apart(placements(bpy), TRUTH, 16) < 0.6
     kinds = {frame: kind for frame, _value, kind in keys(bpy)[0]}
     assert kinds.pop(16) == "KEYFRAME"

@@ -81,10 +81,10 @@ def active(bpy):
     return selection.active(bpy.context)
 
 
-def track(bpy, direction="BOTH", motion="SCALE", **options):
+def track(bpy, direction="BOTH"):
     edit, effect, strip = active(bpy)
     frames = track_region.frames_to_track(edit, strip, direction)
-    return list(track_region.track(edit, effect, strip, 0, frames, motion, **options))
+    return list(track_region.track(edit, effect, strip, 0, frames))
 
 
 def apart(bpy, frame, index, *, of=0):
@@ -180,7 +180,8 @@ def test_frames_outside_of_what_was_tracked_stay_where_they_are(bpy, edit, regio
             motion_keys.insert(active(bpy)[1], 0)
     _edit, effect, strip = active(bpy)
     frames = track_region.frames_to_track(edit, strip, "FORWARD", 20)
-    steps = track_region.track(edit, effect, strip, 0, frames, motion)
+    effect.regions[0].motion = motion
+    steps = track_region.track(edit, effect, strip, 0, frames)
     assert next(steps) == 19
     for frame in (*range(11, 18), *range(20, 31)):
         assert placed(bpy, frame) == pytest.approx(before[frame], abs=1e-5)
@@ -252,7 +253,7 @@ def test_a_region_that_was_moved_and_not_keyed_is_tracked_from_where_it_is(bpy, 
 def begun(bpy, until):
     """Tracking that has come to a frame."""
     edit, effect, strip = active(bpy)
-    steps = track_region.track(edit, effect, strip, 0, range(11, 31), "SCALE")
+    steps = track_region.track(edit, effect, strip, 0, range(11, 31))
     while next(steps) < until:
         pass
     return steps

@@ -367,4 +367,4 @@ def test_what_cannot_be_tracked_is_one_sentence(subject):
     footage = Footage(Film([subject] * 3), lambda frame: frame)
     for given, start, fault in ((region("line"), 9, tracking.NOT_SHOWN), (region("line", drawn=[]), 1, tracking.EMPTY)):
         with pytest.raises(tracking.TrackingError, match=f"^{fault}$"):
-            tracking.RegionTrack(given).follow(footage, start, range(3))
+            next(tracking.RegionTrack(given).follow(footage, start, range(3)))

@@ -7,6 +7,7 @@ A keyframe that the user inserts bends its surroundings until tracking begins at
 again get their tracked place back.
 """
 
+import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -22,7 +23,6 @@ from ...core.messages import EffectError
 from ...core.model import motions, presence
 from ...core.model.effect import Camera, Region
 from ...core.model.motions import Placement, Placements
-from ...core.recipes import region_keys
 from ..data import annotations, fcurves, selection, validation
 
 MADE = "GENERATED"
@@ -38,6 +38,8 @@ ENDS = "opacity", "influence"
 _LOCKED = n_('{place}: the F-curve of "{channel}" is locked')
 _MUTED = n_('{place}: the F-curve of "{channel}" is muted')
 _COUNTS = {"LOCATION": 2, "ROTATION": 3, "SCALE": 4}
+_DIGITS = 6  # of measured numbers: far below a pixel, but above errors that depend on the number of threads
+_STEADY = 0.25  # pixels by which keyframes of the camera may be off, since it moves the whole picture
 
 
 @dataclass(frozen=True)
@@ -121,7 +123,7 @@ class MotionKeys:
         _replace(self._curve("confidence", new=True), every, every)
 
     def needed(self, shape: Region | Camera, start: int, placements: Placements, kept: Collection[int]) -> list[int]:
-        """Return the frames whose keyframes reproduce the motion within a pixel.
+        """Return the frames whose keyframes reproduce the motion within a pixel, or _STEADY.
 
         Args:
             start: frame whose drawing of a region counts.
@@ -129,7 +131,7 @@ class MotionKeys:
         """
         size = annotations.picture_size(self.effect)
         if isinstance(shape, Camera):
-            return motions.thinned(placements, region_keys.CORNERS, size, kept, region_keys.STEADY)
+            return motions.thinned(placements, motions.offsets([motions.PICTURE]), size, kept, _STEADY)
         return motions.thinned(placements, motions.offsets(shape.drawings.at(start)), size, kept)
 
     def confidence(self) -> tuple[np.ndarray, np.ndarray]:
@@ -251,8 +253,9 @@ def _as_tracked(curve: fcurves.Timed, edited: tuple[int, int], frames: list[floa
 
 
 def _values(placement: Placement) -> tuple[float, ...]:
-    """Return a placement in the order of _COMPONENTS and in Blender's units."""
-    return *placement.location, np.radians(placement.rotation), placement.scale
+    """Return a placement in the order of _COMPONENTS and in Blender's units, rounded to _DIGITS of a recipe's."""
+    x, y, rotation, scale = np.round(motions.as_array([placement])[0], _DIGITS).tolist()
+    return x, y, math.radians(rotation), scale
 
 
 def _replace(curve: fcurves.Timed, values: dict[int, float], tracked: Iterable[int]) -> None:

@@ -400,13 +400,12 @@ class Effect:
             combines=tuple(shutter.combine_at(frame) for shutter in self.shutters),
         )
 
-    def with_parts(self, regions: Sequence[Region | MatteRegion], camera: Camera | None = None) -> Effect:
-        """Return the effect with other regions, and another camera; shutters follow the replacements."""
-        camera = camera or self.camera
+    def with_regions(self, regions: Sequence[Region | MatteRegion]) -> Effect:
+        """Return the effect with other regions, which shutters follow instead."""
         new: dict[int, Subject] = {id(old): each for old, each in zip(self.regions, regions, strict=True)}
-        new[id(self.camera)] = camera
-        shutters_ = tuple(replace(each, follow=each.follow and new[id(each.follow)]) for each in self.shutters)
-        return replace(self, shutters=shutters_, regions=tuple(regions), camera=camera)
+        followed = [each.follow and new.get(id(each.follow), each.follow) for each in self.shutters]
+        shutters_ = tuple(replace(each, follow=follow) for each, follow in zip(self.shutters, followed, strict=True))
+        return replace(self, shutters=shutters_, regions=tuple(regions))
 
     def for_picture(self, aspect: float) -> Effect:
         """Return the effect of a recipe for a picture of this width / height."""
@@ -414,7 +413,7 @@ class Effect:
             replace(region, drawings=replace(region.drawings, aspect=aspect)) if region.drawings else region
             for region in self.regions
         ]
-        return self.with_parts(regions)
+        return self.with_regions(regions)
 
     def layers_at(self, frame: float) -> list[Region | MatteRegion]:
         """Return the visible layers at a frame, the farthest first."""

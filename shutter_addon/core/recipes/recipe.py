@@ -7,11 +7,10 @@ from __future__ import annotations
 
 import os
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
 
 from ..messages import UserError
-from ..model.effect import Effect, FileContent, MatteRegion, Region
+from ..model.effect import Effect, FileContent, MatteRegion
 
 
 class RecipeError(UserError, ValueError):
@@ -26,19 +25,6 @@ def contents(source: Effect) -> list[FileContent]:
     """Return the files of the effect's mattes, as the recipe names them."""
     found = [region.content for region in source.regions if isinstance(region, MatteRegion)]
     return [content for content in found if isinstance(content, FileContent)]
-
-
-def moved(source: Effect, old: Path, new: Path) -> Effect:
-    """Return the effect for a recipe in another folder: relative paths of mattes lead to the same files."""
-
-    def rebased(region: Region | MatteRegion) -> Region | MatteRegion:
-        if not isinstance(region, MatteRegion) or not isinstance(content := region.content, FileContent):
-            return region
-        if Path(content.path).is_absolute():
-            return region
-        return replace(region, content=replace(content, path=relative(old / content.path, new)))
-
-    return source.with_parts([rebased(region) for region in source.regions])
 
 
 def relative(path: Path, folder: Path) -> str:

@@ -1,4 +1,4 @@
-"""Records of a recipe's JSON for cattrs, and their conversion to and from effects.
+"""Records of a recipe's JSON, which recipe_file.py reads, and their conversion to and from effects.
 
 A record has the fields that the model declares, and special ones: bars, strokes and keys. Frames are timeline frames; 1
 is the strip's first. Points are fractions of the picture, y up.
@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from copy import copy
 from dataclasses import asdict, dataclass, field, make_dataclass, replace
 from functools import cache, partial
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -163,16 +163,9 @@ MatteRecord: Any = _record(
     **_LAID,
 )
 RampRecord: Any = _record("RampRecord", (model.MatteRegion, model.RampContent), kind=(Literal["ramp"], "ramp"), **_LAID)
-KINDS = {
-    "line": RegionRecord,
-    "lasso": RegionRecord,
-    "outline": OutlineRecord,
-    "matte": MatteRecord,
-    "ramp": RampRecord,
-    "subject": SubjectRecord,
-}
-# cattrs chooses one of KINDS by the field `kind`.
 AnyRegionRecord: Any = RegionRecord | OutlineRecord | MatteRecord | RampRecord | SubjectRecord
+# The record of each word that a region's field `kind` may have.
+KINDS = {word: record for record in get_args(AnyRegionRecord) for word in get_args(record.__annotations__["kind"])}
 RecipeRecord: Any = _record(
     "RecipeRecord",
     (Options, model.Effect, model.Camera),

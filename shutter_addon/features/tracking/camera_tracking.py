@@ -152,19 +152,12 @@ class _Pursuit:
         return float(np.clip((_MOST - np.mean(astray)) / (_MOST - _FEW), 0, 1)) if astray else 1.0
 
     def _compared(self, picture: np.ndarray, anchor: tuple[Part, int, Similarity]) -> FoundMotion:
-        """Return the surer motion, starting from its last speed and from its last place."""
-        part, _, motion = anchor
-        known, sightings = self._last[1], []
-        for guess in (self._speed.after(known), known):
-            match = part.find(picture, guess.after(motion.inverse()), self._motion)
-            sure = tracking.confidence(match, picture)
-            sightings.append(FoundMotion(match.motion.after(motion) if match else known, sure))
-            if sure >= _ANEW:
-                break
-        return max(sightings, key=lambda each: each.confidence)
+        """Return the motion from an anchor, starting from the last speed."""
+        (part, _, motion), known = anchor, self._last[1]
+        match = part.find(picture, self._speed.after(known).after(motion.inverse()), self._motion)
+        return FoundMotion(match.motion.after(motion) if match else known, tracking.confidence(match, picture))
 
     def _anchor_at(self, frame: int, motion: Similarity) -> tuple[Part, int, Similarity] | None:
-        try:
+        with suppress(TrackingError):
             return self._part_at(frame), frame, motion
-        except TrackingError:
-            return None
+        return None

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.frames.frame_source import FrameSource, SourceFile
+from ...core.frames.frame_source import SourceFile
 from ...core.model import outlines
 from ...core.model.effect import Subject
 from ...core.model.motions import Motion, Similarity
@@ -36,11 +36,6 @@ _SURELY = 0.5  # confidence from which on the first frame tells of a drift
 _AGREEING = 0.5  # share of such points from which on a step is sure
 
 
-def cover_of(mattes: FrameSource, shown: Callable[[int], int]) -> Cover:
-    """Return the cover of carried mattes. shown: returns the filmed frame at a timeline frame."""
-    return lambda frame, size: flow.resized(mattes.read(min(shown(frame), mattes.count - 1)), size)
-
-
 def cover_within(drawn: Callable[[int], Sequence]) -> Cover:
     """Return the cover of curves. drawn: returns them at a timeline frame."""
     return lambda frame, size: outlines.coverage(drawn(frame), *size)
@@ -62,7 +57,11 @@ def follow_carried(
         MediaError: a matte cannot be carried
     """
     with closing(file.open()) as mattes:
-        yield from MatteTrack(region, cover_of(mattes, shown.__getitem__)).follow(*what, **how)
+
+        def cover(frame: int, size: tuple[int, int]) -> np.ndarray:
+            return flow.resized(mattes.read(min(shown[frame], mattes.count - 1)), size)
+
+        yield from MatteTrack(region, cover).follow(*what, **how)
 
 
 class MatteTrack(tracking.Track):

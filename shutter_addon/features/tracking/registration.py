@@ -81,9 +81,8 @@ class Part:
         self.weight, self._whole = weight, picture
         x, y, width, height = cv2.boundingRect((weight > 0).astype(np.uint8))
         self.box = x, y, width, height
-        side = int(np.clip(max(width, height) / 4, *_WINDOWS)) // 2 * 2 + 1
-        self._side = side
-        margin = side * 2
+        self._side = int(np.clip(max(width, height) / 4, *_WINDOWS)) // 2 * 2 + 1
+        margin = self._side * 2
         left, top = max(x - margin, 0), max(y - margin, 0)
         crop = np.s_[top : y + height + margin, left : x + width + margin]
         self._picture, self._mask = np.ascontiguousarray(picture[crop]), np.ascontiguousarray(weight[crop])

@@ -45,7 +45,6 @@ _NEAR, _ENOUGH_NEAR, _FAR = 0.03, 3, 0.3
 SURE = 0.5  # from here on, errors are within about a pixel of 640
 _LOST = 0.12  # below, nothing was found
 _AGAIN = 0.3  # below, nothing was found in a search of a larger area
-DOUBTFUL = 0.2  # below, a larger area is searched
 _DRIFT, _LEAST = 0.95, 0.1  # the factor for a later look, and its least confidence
 _SHIFTED = 0.6  # the factor if only the location was found, without rotation and scale
 _FADING = 0.6  # below, a later look is compared as well
@@ -115,9 +114,7 @@ class PartTracker:
         sighting = None if missed else self._near(picture, self._speed.after(self._known))
         if sighting is None:
             self._look_anew()
-            sighting = self._elsewhere(picture, missed, self._look)
-        elif sighting.confidence < DOUBTFUL:
-            sighting = self._elsewhere(picture, missed) or sighting
+            sighting = self._elsewhere(picture, missed)
         if sighting is None:
             if not missed:
                 going_on = self._speed.after(self._speed).after(self._known)(self._first.points)
@@ -169,20 +166,19 @@ class PartTracker:
         sure = confidence(match, picture)
         if match and sure >= SURE:
             self._first.learn(match)
-        if match and sure >= _FADING:
-            return FoundMotion(match.motion, sure, match.held)
-        later = self._by_later_look(picture, guess)
-        if later is None:
-            return FoundMotion(match.motion, sure, match.held) if match and sure >= _LOST else None
-        points = self._first.points
-        if sure < SURE and np.abs(later.motion(points) - guess(points)).max() > 1:
-            # starting from there, the first look may be found
-            again = self._first.find(picture, later.motion, self._motion)
-            if confidence(again, picture) > sure:
-                match, sure = again, confidence(again, picture)
-        if match is None or sure < min(SURE, later.confidence):
-            return later
-        return FoundMotion(match.motion, sure, match.held)
+        if sure < _FADING:
+            later = self._by_later_look(picture, guess)
+            if later is None and sure < _LOST:
+                return None
+            points = self._first.points
+            if later and sure < SURE and np.abs(later.motion(points) - guess(points)).max() > 1:
+                # starting from there, the first look may be found
+                again = self._first.find(picture, later.motion, self._motion)
+                if confidence(again, picture) > sure:
+                    match, sure = again, confidence(again, picture)
+            if later and sure < min(SURE, later.confidence):
+                return later
+        return FoundMotion(match.motion, sure, match.held) if match else None
 
     def _by_later_look(self, picture: np.ndarray, guess: Similarity) -> FoundMotion | None:
         if self._look.part is self._first:
@@ -199,11 +195,11 @@ class PartTracker:
         if later := self._first.again(picture, motion):
             self._look = _Look(later, motion, max(_DRIFT * worth, _LEAST))
 
-    def _elsewhere(self, picture: np.ndarray, missed: int, *looks: _Look) -> FoundMotion | None:
-        """Find the part by its first look or by others, in the area where it may be by now."""
+    def _elsewhere(self, picture: np.ndarray, missed: int) -> FoundMotion | None:
+        """Find the part by its first look or by a later one, in the area where it may be by now."""
         radius = _AROUND * picture.shape[1] * (1 + missed / 4)
         sightings = []
-        for look in (_Look(self._first, Similarity(), 1.0), *looks):
+        for look in (_Look(self._first, Similarity(), 1.0), self._look):
             from_there = self._known.after(look.motion.inverse())
             for guess in (from_there, look.part.seek(picture, from_there, radius)):
                 match = look.part.find(picture, guess, self._motion) if guess else None
@@ -301,8 +297,8 @@ class Track(ABC):
                 are then yielded again, blended with tracking back from the anchor.
 
         Raises:
-            TrackingError: at once, if nothing can be tracked
-            MediaError: while iterating, if a frame cannot be read
+            TrackingError: nothing can be tracked
+            MediaError: a frame cannot be read
         """
         self._footage, self._motion = footage, motion
         centres = {frame: self._subject.centre(frame) for frame in frames}
@@ -314,7 +310,7 @@ class Track(ABC):
         if len(frames) < 2:
             raise TrackingError(ALONE)
         self._tracker(start)
-        return self._both_ways(start, range(min(frames), max(frames) + 1), {*anchors} - {start})
+        yield from self._both_ways(start, range(min(frames), max(frames) + 1), {*anchors} - {start})
 
     @abstractmethod
     def _tracker(self, start: int) -> tuple[Pursuit, float]:

@@ -9,7 +9,7 @@ from bpy.props import EnumProperty, IntProperty
 from bpy.types import Context, Operator, PropertyGroup, Scene, Strip, UILayout
 
 from .... import features
-from ....blender.data import selection, validation
+from ....blender.data import selection
 from ....blender.editing import bar_edits, motion_keys
 from ....blender.interface import needs
 from ....blender.interface.operator_bases import Beside, OfEffect, given, operator, redraw, report, show_status
@@ -66,9 +66,8 @@ class _Tracks(Beside):
         if self.once and track_region.is_tracked(scene, effect, strip, index):
             return self._finish(context)
         self._frames = track_region.frames_to_track(scene, strip, self.direction, moving.track_until)
-        options = {"all_keys": moving.track_all_keys, "patience": None if waits else _PATIENCE}
-        motion = validation.word(moving, "motion")
-        self._steps = track_region.track(scene, effect, strip, index, self._frames, motion, **options)
+        patience = None if waits else _PATIENCE
+        self._steps = track_region.track(scene, effect, strip, index, self._frames, patience)
         if not self._track(math.inf if waits else _TICK):
             return self._finish(context)
         self._show(context)

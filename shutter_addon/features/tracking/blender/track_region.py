@@ -55,15 +55,7 @@ def frames_to_track(scene: Scene, strip: Strip, direction: str, until: int = 0) 
 
 
 def track(
-    scene: Scene,
-    effect: PropertyGroup,
-    strip: Strip,
-    index: int | None,
-    frames: range,
-    motion: str,
-    *,
-    all_keys: bool = False,
-    patience: float | None = None,
+    scene: Scene, effect: PropertyGroup, strip: Strip, index: int | None, frames: range, patience: float | None = None
 ) -> Generator[int | None, None, None]:
     """Track a region or the camera from the current frame through timeline frames (frames_to_track).
 
@@ -71,8 +63,6 @@ def track(
     gone.
 
     Args:
-        motion: a word of choices.MOTIONS.
-        all_keys: keep a keyframe at each frame.
         patience: seconds after which None is yielded while no frame is ready; None: wait.
 
     Raises:
@@ -81,6 +71,7 @@ def track(
     moving = selection.moving(effect, index)
     validation.check_moving(moving)
     motion_keys.check_curves(effect, index)
+    motion, all_keys = validation.word(moving, "motion"), moving.track_all_keys
     start, keys = scene.frame_current, MotionKeys(effect, index, motion)
     anchors = [frame for frame in keys.edited(frames) if frame != start]
     here = Tracked(frame=start, placement=placement_now(moving), confidence=1.0)
@@ -94,7 +85,7 @@ def track(
         try:
             clip = effect_source.clip_of(shown, source)
             footage = Footage(source, lambda frame: clip.shown(frame).source_frame)
-            found = partial(follow, footage, start, frames, motion=motion.lower(), anchors=anchors)
+            found = follow(footage, start, frames, motion=motion.lower(), anchors=anchors)
             for step in _followed(found, patience):
                 if step is None:
                     yield None
@@ -222,22 +213,14 @@ def _standing(moving: Any, here: Tracked) -> Any:
     return replace(moving, moves=replace(moving.moves, **sampled))
 
 
-def _followed(follow: Callable, patience: float | None) -> Iterator[Tracked | None]:
-    """Yield what `follow` finds on a thread (threads.beside), with errors in the user's language.
-
-    Args:
-        follow: a tracking.Track.follow with its arguments.
-    """
+def _followed(found: Iterator[Tracked], patience: float | None) -> Iterator[Tracked | None]:
+    """Yield what tracking finds on a thread (threads.beside), with errors in the user's language."""
     with translated(rpt_):
         try:
-            with closing(threads.beside(_each(follow), patience)) as steps:
+            with closing(threads.beside(found, patience)) as steps:
                 yield from steps
         except tracking.TrackingError as error:
             raise EffectError(rpt_(str(error))) from None
-
-
-def _each(follow: Callable[[], Iterator[Tracked]]) -> Iterator[Tracked]:
-    yield from follow()
 
 
 def _write(keys: MotionKeys, kept: Iterable[Tracked], tracked: Iterable[Tracked]) -> None:
