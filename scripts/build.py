@@ -24,8 +24,8 @@ import fetch_model
 import without_openssl
 
 ROOT = Path(__file__).resolve().parents[1]
-# What Blender 5.2 lacks; it brings NumPy and OpenImageIO. Nothing that it brings may be in here: an extension's wheels
-# come before Blender's own modules, for all of Blender.
+# What Blender 5.2 lacks; it brings NumPy, OpenImageIO and cattrs with attrs and typing_extensions. Nothing that it
+# brings may be in here: an extension's wheels come before Blender's own modules, for all of Blender.
 WHEELS = (
     "av==19.0.2",
     "glcontext==3.1.0",

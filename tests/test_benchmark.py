@@ -16,7 +16,7 @@ ALLOWED |= dict.fromkeys(("lightest", "darkest", "median"), 1.0)
 # Numbers and pictures alone: everything else must not be needed.
 ALONE = """
 import sys
-for name in ("bpy", "av", "OpenImageIO", "scipy", "tqdm"):
+for name in ("bpy", "cattrs", "av", "OpenImageIO", "scipy", "tqdm"):
     sys.modules[name] = None
 import runpy
 sys.argv = sys.argv[1:]

@@ -203,27 +203,32 @@ def test_the_wheels_are_what_the_code_needs_and_blender_lacks():
     """Of the requirements, all but what Blender brings."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     needed = {requirement.split(">")[0].replace("-", "_") for requirement in project["dependencies"]}
-    assert needed - {"numpy", "OpenImageIO"} == WHEELS - {"glcontext"}  # moderngl's own requirement
+    assert needed - {"numpy", "OpenImageIO", "cattrs"} == WHEELS - {"glcontext"}  # moderngl's own requirement
 
 
 WITHOUT = """
 import sys
-sys.modules |= dict.fromkeys(("av", "moderngl"))
+sys.modules |= dict.fromkeys(("av", "cattrs", "moderngl"))
 from shutter_addon.compute.renderer import open_compositor
+from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media import MediaError, open_source
 
 assert open_compositor("cpu").name == "NumPy"
-try:
-    open_source("none.mp4")
-except MediaError as error:
-    print(error)
+recipe = '{"version": 1, "window": 1, "shutters": [{"name": "S", "bars": [1]}]}'
+for function, argument in ((open_source, "none.mp4"), (recipe_file.parse, recipe)):
+    try:
+        function(argument)
+    except (MediaError, recipe_file.RecipeError) as error:
+        print(error)
 """
 
 
 def test_what_needs_a_package_that_is_missing_is_one_sentence():
     command = [sys.executable, "-c", WITHOUT]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
-    assert done.stdout.startswith("none.mp4: no such file")
+    none, recipe = done.stdout.splitlines()
+    assert none.startswith("none.mp4: no such file")
+    assert "recipes need the Python package cattrs" in recipe
 
 
 class Installation:

@@ -5,6 +5,7 @@ import sys
 
 import av  # noqa: F401
 import bpy  # noqa: F401
+import cattrs  # noqa: F401
 import cv2  # noqa: F401
 import moderngl  # noqa: F401
 import tqdm

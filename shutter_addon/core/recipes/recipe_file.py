@@ -6,12 +6,12 @@ import json
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping
-from dataclasses import MISSING, Field, fields, is_dataclass
+from collections.abc import Callable
+from dataclasses import is_dataclass
 from functools import cache, partial
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_origin
 
 from .. import atomic_write
 from ..model import effect as model
@@ -20,6 +20,9 @@ from ..model.frame_state import EXTREMES
 from . import records
 from .recipe import CAMERA, RecipeError
 from .records import drawn_in
+
+if TYPE_CHECKING:
+    from cattrs import Converter
 
 
 def load(path: str | Path) -> model.Effect:
@@ -70,10 +73,11 @@ def parse(text: str) -> model.Effect:
         data.pop("inbetween_method", None)  # only one method is left
         if data.get("inbetween", 1) != 1:
             data.setdefault("skip_repeats", False)  # the behaviour of version 1
+    converter = _converter()
     try:
-        recipe = _reader(records.RecipeRecord)(data)
-    except _FaultError as fault:
-        raise RecipeError(f"{fault.place.lstrip('.') or 'recipe'}: {fault}") from None
+        recipe: Any = converter.structure(data, records.RecipeRecord)
+    except Exception as error:
+        raise RecipeError(_first_fault(error)) from None
     check(recipe)
     return records.effect_of(recipe)
 
@@ -97,11 +101,11 @@ def save(effect: model.Effect, path: str | Path) -> None:
 
 
 def _object(pairs: list) -> dict:
-    made = dict(pairs)
-    if len(made) < len(pairs):
+    fields = dict(pairs)
+    if len(fields) < len(pairs):
         twice = Counter(name for name, _ in pairs).most_common(1)[0][0]
         raise RecipeError(f"recipe: field {shown(twice)} is given twice")
-    return made
+    return fields
 
 
 def _whole(digits: str) -> int | float:
@@ -109,121 +113,155 @@ def _whole(digits: str) -> int | float:
     return int(digits) if len(digits) <= 300 else float(digits)
 
 
-class _FaultError(Exception):
-    """A value breaks the format. `place` says where, like `.shutters[1].bars`."""
-
-    def __init__(self, message: str, place: str = "") -> None:
-        super().__init__(message)
-        self.place = place
-
-
-@cache
-def _reader(kind: Any) -> Callable[[Any], Any]:
-    """Return a function that checks a value of JSON and converts it to a type of records.py, or raises _FaultError."""
-    origin, inner = get_origin(kind), get_args(kind)
-    if is_dataclass(kind):
-        parts: list[Any] = [*fields(kind)]
-        return partial(_record, kind, {each.name: (_reader(each.type), each) for each in parts})
-    if origin is Annotated:
-        return partial(_within, _reader(inner[0]), *inner[1])
-    if origin is Literal:
-        return partial(_choice, inner)
-    if origin in (Union, UnionType):
-        return partial(_union, kind)
-    if origin is not None:
-        return partial(_items, kind, _reader(inner[0]))
-    return _number if kind is float else partial(_exactly, kind)
+def _number(value: Any, _kind: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError(f"{shown(value)} is not a number")
+    if not math.isfinite(value):
+        raise ValueError(f"{value} is not a finite number")
+    return float(value)
 
 
-def _record(kind: Any, readers: Mapping[str, tuple[Callable, Field]], value: Any) -> Any:
-    if not isinstance(value, dict):
-        raise _FaultError(f"{shown(value)} is not an object")
-    made, name = {}, ""
-    try:
-        for name, (read, each) in readers.items():
-            if name in value:
-                made[name] = read(value[name])
-            elif each.default is MISSING and each.default_factory is MISSING:
-                raise _FaultError("missing")
-    except _FaultError as fault:
-        fault.place = f".{name}{fault.place}"
-        raise
-    if unknown := sorted(value.keys() - readers.keys()):
-        more = f" and {len(unknown) - 3} more" if len(unknown) > 3 else ""
-        raise _FaultError(f"unknown field {', '.join(map(cut, unknown[:3]))}{more}")
-    return kind(**made)
+def _within(converter: Converter, value: Any, kind: Any) -> Any:
+    """Structure a number, a text or a list of a limited range or length."""
+    inner, (least, most, empty) = get_args(kind)
+    made = converter.structure(value, inner)
+    if isinstance(made, str | list):
+        if len(made) > most or len(made) < least:
+            many = f"{len(made)}{' characters' * isinstance(made, str)}, the most are {most}"
+            raise ValueError(many if made else empty)
+        wrong = next((c for c in made if c == "\0" or "\ud800" <= c <= "\udfff"), "") if isinstance(made, str) else ""
+        if wrong:
+            raise ValueError(f"U+{ord(wrong):04X} is not allowed in a name")
+    elif not least <= made <= most:
+        raise ValueError(f"{plain(made)} is not {plain(least)} to {plain(most)}")
+    return made
 
 
-def _items(kind: Any, read: Callable, value: Any) -> list | tuple:
-    """Read a list, or a tuple whose items have one type."""
-    origin, inner = get_origin(kind), get_args(kind)
-    if not isinstance(value, list):
-        raise _FaultError(f"{shown(value)} is not a list")
-    if origin is tuple and len(value) != len(inner):
-        raise _FaultError(f"{len(value)} values, not {len(inner)}")
-    made: list[Any] = []
-    try:
-        for each in value:
-            item = read(each)
-            if made and hasattr(item, "frame") and item.frame <= made[-1].frame:
-                raise _FaultError(f"{plain(item.frame)} does not follow {plain(made[-1].frame)}", ".frame")
-            made.append(item)
-    except _FaultError as fault:
-        fault.place = f"[{len(made)}]{fault.place}"
-        raise
-    return made if origin is list else tuple(made)
-
-
-def _union(kind: Any, value: Any) -> Any:
-    """Read a region, a number or its keys, strokes of the first frame or of several, or what may be null."""
+def _union(converter: Converter, value: Any, kind: Any) -> Any:
+    """Structure a region, a number or its keys, strokes of the first frame or of several, or what may be null."""
     first, *others = get_args(kind)
     if kind == records.AnyRegionRecord:
         word = value.get("kind", "line") if isinstance(value, dict) else "line"
         if not isinstance(word, str) or word not in records.KINDS:
-            raise _FaultError(f"{shown(word)} is none of {', '.join(records.KINDS)}", ".kind")
-        return _reader(records.KINDS[word])(value)
+            raise _of_field("kind", f"{shown(word)} is none of {', '.join(records.KINDS)}")
+        return converter.structure(value, records.KINDS[word])
     if value is None and others[-1] is NoneType:
         return None
     is_keyed = isinstance(value, list) and (kind != records.Strokes or (value and isinstance(value[0], dict)))
-    return _reader(first if others[0] is NoneType or not is_keyed else others[0])(value)
+    if others[0] is NoneType or not is_keyed:
+        return converter.structure(value, first)
+    return converter.structure(value, others[0])
 
 
-def _within(read: Callable, least: float, most: float, empty: str, value: Any) -> Any:
-    """Read a number, a text or a list of a limited range or length."""
-    made = read(value)
-    if isinstance(made, str | list):
-        if len(made) > most or len(made) < least:
-            many = f"{len(made)}{' characters' * isinstance(made, str)}, the most are {most}"
-            raise _FaultError(many if made else empty)
-        wrong = next((c for c in made if c == "\0" or "\ud800" <= c <= "\udfff"), "") if isinstance(made, str) else ""
-        if wrong:
-            raise _FaultError(f"U+{ord(wrong):04X} is not allowed in a name")
-    elif not least <= made <= most:
-        raise _FaultError(f"{plain(made)} is not {plain(least)} to {plain(most)}")
-    return made
+def _exactly(wanted: type, name: str) -> Callable[[Any, Any], Any]:
+    def structure(value: Any, _kind: Any) -> Any:
+        if type(value) is not wanted:
+            raise ValueError(f"{shown(value)} is not {name}")
+        return value
+
+    return structure
 
 
-def _choice(allowed: tuple, value: Any) -> Any:
+def _choice(value: Any, kind: Any) -> Any:
+    allowed = get_args(kind)
     if not any(type(value) is type(option) and value == option for option in allowed):
-        raise _FaultError(f"{shown(value)} is none of {', '.join(map(str, allowed))}")
+        raise ValueError(f"{shown(value)} is none of {', '.join(map(str, allowed))}")
     return value
 
 
-def _number(value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise _FaultError(f"{shown(value)} is not a number")
-    if not math.isfinite(value):
-        raise _FaultError(f"{value} is not a finite number")
-    return float(value)
+def _items(converter: Converter, value: Any, kind: Any) -> list | tuple:
+    """Structure a list, or a tuple whose items have one type."""
+    inner = get_args(kind)
+    if not isinstance(value, list):
+        raise ValueError(f"{shown(value)} is not a list")
+    if get_origin(kind) is tuple and len(value) != len(inner):
+        raise ValueError(f"{len(value)} values, not {len(inner)}")
+    hook = converter.get_structure_hook(inner[0])
+    structured: list[Any] = []
+    try:
+        for each in value:
+            made = hook(each, inner[0])
+            if structured and hasattr(made, "frame") and made.frame <= structured[-1].frame:
+                raise _of_field("frame", f"{plain(made.frame)} does not follow {plain(structured[-1].frame)}")
+            structured.append(made)
+    except Exception as error:  # stop at the first fault; cattrs would collect millions
+        from cattrs.errors import IterableValidationError, IterableValidationNote
+
+        index = len(structured)
+        error.add_note(IterableValidationNote(f"index {index}", index, inner[0]))
+        raise IterableValidationError("in a list", [error], kind) from None
+    return get_origin(kind)(structured)
 
 
-_NAMES = {int: "a whole number", str: "a text", bool: "true or false"}
+def _of_field(name: str, message: str) -> Exception:
+    """Return an error about a field of an object."""
+    from cattrs.errors import AttributeValidationNote, ClassValidationError
+
+    error = ValueError(message)
+    error.add_note(AttributeValidationNote("in an object", name, str))
+    return ClassValidationError("in an object", [error], dict)
 
 
-def _exactly(kind: type, value: Any) -> Any:
-    if type(value) is not kind:
-        raise _FaultError(f"{shown(value)} is not {_NAMES[kind]}")
-    return value
+def _dataclass(kind: Any, converter: Converter) -> Callable[[Any, Any], Any]:
+    from cattrs.gen import make_dict_structure_fn
+
+    structure_fields = make_dict_structure_fn(kind, converter, _cattrs_forbid_extra_keys=True)
+
+    def structure(value: Any, kind: Any) -> Any:
+        if not isinstance(value, dict):
+            raise ValueError(f"{shown(value)} is not an object")
+        return structure_fields(value, kind)
+
+    return structure
+
+
+def _made_of(*origins: Any) -> Callable[[Any], bool]:
+    return lambda kind: get_origin(kind) in origins
+
+
+@cache
+def _converter() -> Converter:
+    """Return the converter.
+
+    Raises:
+        RecipeError: cattrs is missing. Blender brings it, but a Linux distribution's Blender may not. Effects render
+            without it.
+    """
+    try:
+        import cattrs
+    except ImportError as error:
+        raise RecipeError(
+            f"recipes need the Python package cattrs ({error}); install it for Blender's Python"
+        ) from None
+    converter = cattrs.Converter()
+    converter.register_structure_hook(float, _number)
+    converter.register_structure_hook(int, _exactly(int, "a whole number"))
+    converter.register_structure_hook(str, _exactly(str, "a text"))
+    converter.register_structure_hook(bool, _exactly(bool, "true or false"))
+    converter.register_structure_hook_func(_made_of(Literal), _choice)
+    converter.register_structure_hook_func(_made_of(Annotated), partial(_within, converter))
+    converter.register_structure_hook_func(_made_of(Union, UnionType), partial(_union, converter))
+    converter.register_structure_hook_func(_made_of(list, tuple), partial(_items, converter))
+    converter.register_structure_hook_factory(is_dataclass, _dataclass)
+    return converter
+
+
+def _first_fault(error: Exception) -> str:
+    """Return the first fault as `place: what is wrong`."""
+    import cattrs
+    from cattrs.errors import ForbiddenExtraKeysError
+
+    def described(error: BaseException, kind: Any) -> str:
+        if isinstance(error, KeyError):
+            return "missing"
+        if isinstance(error, ForbiddenExtraKeysError):
+            names = sorted(error.extra_fields)
+            more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+            return f"unknown field {', '.join(map(cut, names[:3]))}{more}"
+        return str(error)
+
+    message, _, place = cattrs.transform_error(error, "$", described)[0].rpartition(" @ $")
+    return f"{place.lstrip('.') or 'recipe'}: {message}"
 
 
 def shown(value: Any) -> str:

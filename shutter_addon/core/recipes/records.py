@@ -1,4 +1,4 @@
-"""Records of a recipe's JSON, which recipe_file.py reads, and their conversion to and from effects.
+"""Records of a recipe's JSON for cattrs, and their conversion to and from effects.
 
 A record has the fields that the model declares, and special ones: bars, strokes and keys. Frames are timeline frames; 1
 is the strip's first. Points are fractions of the picture, y up.
@@ -164,7 +164,7 @@ MatteRecord: Any = _record(
 )
 RampRecord: Any = _record("RampRecord", (model.MatteRegion, model.RampContent), kind=(Literal["ramp"], "ramp"), **_LAID)
 AnyRegionRecord: Any = RegionRecord | OutlineRecord | MatteRecord | RampRecord | SubjectRecord
-# The record of each word that a region's field `kind` may have.
+# cattrs chooses by `kind`: the record of each word that a region's field `kind` may have.
 KINDS = {word: record for record in get_args(AnyRegionRecord) for word in get_args(record.__annotations__["kind"])}
 RecipeRecord: Any = _record(
     "RecipeRecord",
