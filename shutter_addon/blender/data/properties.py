@@ -31,6 +31,7 @@ from . import consistency, matte_content, selection
 from .consistency import changed
 
 KEYED = {"ANIMATABLE"}  # Blender's default
+_DISTANCES, _TURN = {"min": -MAX_DISTANCE, "max": MAX_DISTANCE}, math.radians(MAX_DEGREES)
 
 
 def with_fields(*kinds: type, **more: dict) -> Callable[[type], type]:
@@ -87,6 +88,11 @@ def choice(name: str, description: str, items: Sequence[tuple[str, str, str]], *
     return labelled(EnumProperty, name, description, items=items, options=set(), **more)
 
 
+def setting(kind: Callable, name: str, description: str, **more: Any) -> object:
+    """Return a property without keys that changes no picture, with our own translation."""
+    return kind(name=name, description=description, options=set(), translation_context=CONTEXT, **more)
+
+
 class TrackStop(PropertyGroup):
     """The end of a track before its target.
 
@@ -108,9 +114,14 @@ class DrawnPlace(PropertyGroup):
     scale: FloatProperty(default=1.0)
 
 
-class _Tracked:
-    """Results and settings of tracking a region or the camera."""
+class _Moving:
+    """Where a region or the camera is, and results and settings of tracking it."""
 
+    location: labelled(
+        FloatVectorProperty, "Location", "Movement as a fraction of the picture", size=2, subtype="XYZ", **_DISTANCES
+    )
+    rotation: labelled(FloatProperty, "Rotation", "Rotation about the center", subtype="ANGLE", min=-_TURN, max=_TURN)
+    scale: labelled(FloatProperty, "Scale", "Scale about the center", default=1.0, min=-MAX_SCALE, max=MAX_SCALE)
     confidence: FloatProperty(
         name="Confidence",
         description="How certain the tracked position is",
@@ -120,52 +131,24 @@ class _Tracked:
         max=100.0,
     )
     stops: CollectionProperty(type=TrackStop)
-    motion: EnumProperty(
-        name="Motion",
-        description="Which channels Track and Follow key",
-        items=MOTIONS,
-        options=set(),
-        default="SCALE",
-        translation_context=CONTEXT,
+    motion: setting(EnumProperty, "Motion", "Which channels Track and Follow key", items=MOTIONS, default="SCALE")
+    track_until: setting(IntProperty, "Until", "Timeline frame at which tracking stops; 0 is the end of the strip")
+    track_all_keys: setting(
+        BoolProperty, "All Keys", "Key every tracked frame, not only those that the motion needs within a pixel"
     )
-    track_until: IntProperty(
-        name="Until",
-        description="Timeline frame at which tracking stops; 0 is the end of the strip",
-        options=set(),
-        translation_context=CONTEXT,
-    )
-    track_all_keys: BoolProperty(
-        name="All Keys",
-        description="Keep a key at every tracked frame, in place of those that the motion needs within a pixel",
-        options=set(),
-    )
-    track_ends: BoolProperty(
-        name="Fade Out When Lost",
-        description="Track keys a region's opacity, or the camera's influence, so that it fades where the track ends; "
+    track_ends: setting(
+        BoolProperty,
+        "Fade Out When Lost",
+        "Track keys a region's opacity, or the camera's influence, so that it fades where the track ends; "
         "a region ends with its shot",
         default=True,
-        options=set(),
     )
-
-
-def location_property(description: str) -> object:
-    limits = {"min": -MAX_DISTANCE, "max": MAX_DISTANCE}
-    return labelled(FloatVectorProperty, "Location", description, subtype="XYZ", size=2, **limits)
-
-
-def rotation_property(description: str) -> object:
-    limit = math.radians(MAX_DEGREES)
-    return labelled(FloatProperty, "Rotation", description, subtype="ANGLE", min=-limit, max=limit)
-
-
-def scale_property(description: str) -> object:
-    return labelled(FloatProperty, "Scale", description, default=1.0, min=-MAX_SCALE, max=MAX_SCALE)
 
 
 @with_fields(
     model.Region, model.OutlineRegion, model.FileContent, model.RampContent, name={"set_transform": _region_renamed}
 )
-class ShutterRegion(_Tracked, PropertyGroup):
+class ShutterRegion(_Moving, PropertyGroup):
     shutter: labelled(StringProperty, "Shutter", "Name of the shutter that holds in the region")
     layer: labelled(StringProperty, "Layer", "Annotation layer that holds the strokes")
     not_layer: labelled(StringProperty, "Not This", "Annotation layer of strokes on what the subject is not")
@@ -187,9 +170,6 @@ class ShutterRegion(_Tracked, PropertyGroup):
     )
     mask: labelled(PointerProperty, "Mask", "Mask that is the matte", type=bpy.types.Mask)
     channel_name: labelled(StringProperty, "Channel Name", "Name of the channel in the EXR file", maxlen=MAX_CHANNEL)
-    location: location_property("Distance from where the region was drawn, as a fraction of the picture")
-    rotation: rotation_property("Rotation about the region's center")
-    scale: scale_property("Scale about the region's center")
     follow_clip: PointerProperty(
         name="Clip",
         description="Movie clip of the source's footage, in which something is tracked",
@@ -203,11 +183,8 @@ class ShutterRegion(_Tracked, PropertyGroup):
 
 
 @with_fields(model.Camera)
-class ShutterCamera(_Tracked, PropertyGroup):
+class ShutterCamera(_Moving, PropertyGroup):
     name: StringProperty(name="Name", description="Name of the camera's animation channels", default="Camera")
-    location: location_property("Movement of what the camera sees, as a fraction of the picture")
-    rotation: rotation_property("Rotation of what the camera sees, about the picture's center")
-    scale: scale_property("Scale of what the camera sees, about the picture's center")
 
 
 def _shutter_renamed(shutter: PropertyGroup, new: str, old: str, _is_set: bool) -> str:
@@ -264,7 +241,7 @@ class _Settings:
     use_source_time: labelled(
         BoolProperty,
         "Custom Time",
-        "Show the source at the time that is set here, in place of the strip's own timing",
+        "Show the source at the time that is set here, not at the strip's own",
         options=set(),
     )
     source_time: labelled(

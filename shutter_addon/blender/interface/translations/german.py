@@ -530,15 +530,12 @@ MESSAGES = {
     ("*", "Width"): "Breite",
     ("*", "Width of the lines as a fraction of the picture's height"): "Breite der Linien als Bruchteil der Bildhöhe",
     ("*", "Location"): "Position",
-    (
-        "*",
-        "Distance from where the region was drawn, as a fraction of the picture",
-    ): "Abstand vom Ort, an dem die Region gezeichnet wurde, als Bruchteil des Bildes",
+    ("*", "Movement as a fraction of the picture"): "Bewegung als Bruchteil des Bildes",
     ("*", "Rotation"): "Rotation",
-    ("*", "Rotation about the region's center"): "Rotation um die Mitte der Region",
+    ("*", "Rotation about the center"): "Rotation um die Mitte",
     ("Operator", "Transform Region"): "Region transformieren",
     ("*", "Scale"): "Skalieren",
-    ("*", "Scale about the region's center"): "Skalierung um die Mitte der Region",
+    ("*", "Scale about the center"): "Skalierung um die Mitte",
     # Mattes and ramps
     ("Operator", "Matte from File"): "Matte aus Datei",
     (
@@ -1002,11 +999,11 @@ MESSAGES = {
         "*",
         "Timeline frame at which tracking stops; 0 is the end of the strip",
     ): "Bild der Zeitleiste, bei dem das Verfolgen anhält; 0 ist das Ende des Streifens",
-    ("*", "All Keys"): "Alle Schlüsselbilder",
+    ("Virtual Shutter", "All Keys"): "Alle Schlüsselbilder",
     (
         "*",
-        "Keep a key at every tracked frame, in place of those that the motion needs within a pixel",
-    ): "Ein Schlüsselbild in jedem verfolgten Bild, statt derer, die die Bewegung auf ein Pixel genau braucht",
+        "Key every tracked frame, not only those that the motion needs within a pixel",
+    ): "Jedes verfolgte Bild bekommt ein Schlüsselbild, nicht nur, wo die Bewegung es auf ein Pixel genau braucht",
     ("*", "Tracking: {done} of {total} frames, Esc to stop"): "Verfolgt: {done} von {total} Bildern, Esc hält an",
     (
         "*",
@@ -1073,7 +1070,7 @@ MESSAGES = {
         "*",
         "the picture is too unlike those before; tracking goes on from here",
     ): "das Bild ist denen davor zu unähnlich; von hier aus geht die Verfolgung weiter",
-    ("*", "Fade Out When Lost"): "Ausblenden, wenn verloren",
+    ("Virtual Shutter", "Fade Out When Lost"): "Ausblenden, wenn verloren",
     (
         "*",
         "Track keys a region's opacity, or the camera's influence, so that it fades where the track ends; "
@@ -1167,18 +1164,6 @@ MESSAGES = {
     ): "Wie weit sich bei offenem Verschluss bewegt, was verfolgt wird, als Bruchteil der Bildhöhe",
     (
         "*",
-        "Movement of what the camera sees, as a fraction of the picture",
-    ): "Wohin sich bewegt hat, was die Kamera sieht, als Bruchteil des Bildes",
-    (
-        "*",
-        "Rotation of what the camera sees, about the picture's center",
-    ): "Drehung dessen, was die Kamera sieht, um die Bildmitte",
-    (
-        "*",
-        "Scale of what the camera sees, about the picture's center",
-    ): "Skalierung dessen, was die Kamera sieht, um die Bildmitte",
-    (
-        "*",
         '{place}: there is no region "{region}" to follow',
     ): "{place}: Es gibt keine Region „{region}“, der zu folgen wäre",
     ("*", "Exposure Moves With"): "Belichtung bewegt sich mit",
@@ -1261,7 +1246,7 @@ MESSAGES = {
     ("*", "Custom Time"): "Eigene Zeit",
     (
         "*",
-        "Show the source at the time that is set here, in place of the strip's own timing",
+        "Show the source at the time that is set here, not at the strip's own",
     ): "Die Quelle zu der Zeit zeigen, die hier eingestellt ist, anstelle der Zeit des Streifens",
     ("*", "Source Time"): "Quellzeit",
     (
