@@ -63,7 +63,7 @@ def sound_faults(scene: Scene, frames: range) -> list[str]:
 
 def _of_strips(scene: Scene, frames: range, kinds: tuple[str, ...], *, sources: bool) -> list[str]:
     sentences = []
-    for shown, wanted in requirements.scenes_at(scene, frames):
+    for shown, wanted in requirements.shown_scenes(scene, frames).items():
         others = [] if sources else [each.source.name for each in strips.with_sources(shown)]
         for strip in shown.sequence_editor.strips_all:
             at = frame_ranges.common(requirements.shown_frames(shown, strip), wanted)

@@ -48,17 +48,6 @@ def local_scenes() -> list:
     return [scene for scene in bpy.data.scenes if scene.library is None]
 
 
-def shown_scenes(scene: Scene) -> list:
-    """Return the scene, and those that its Scene strips show."""
-    shown, new = [], [scene]
-    while new:
-        other = new.pop()
-        if other is not None and other not in shown and other.sequence_editor:
-            shown.append(other)
-            new += [strip.scene for strip in other.sequence_editor.strips_all if strip.type == "SCENE"]
-    return shown
-
-
 def own_strips(scene: Scene) -> list[Strip]:
     """Return the strips that were made for effects, even if their scene has another engine or was deleted."""
     return [strip for strip in all_strips(scene) if strip.type == "SCENE" and _is_own(strip)]

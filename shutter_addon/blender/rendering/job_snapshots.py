@@ -118,7 +118,7 @@ def _late(uid: int, scene_frame: float) -> Snapshot:
 
 def shown_effects(film: Scene) -> Iterator[tuple[Scene, PropertyGroup, list[Strip]]]:
     """Yield the effects that a film's scene and the scenes in its Scene strips show: scene, effect, effect strips."""
-    for scene in strips.shown_scenes(film):
+    for scene in requirements.shown_scenes(film):
         shown = strips.effect_strips(scene)
         for effect in scene.virtual_shutter.effects:
             if parts := [strip for strip in shown if strip.scene == effect.scene]:
