@@ -60,13 +60,7 @@ def tell(words: str | None) -> None:
     if bpy.app.background:
         render_job.say(words)
     else:  # a file that is being loaded has no windows yet
-        main_thread.soon(partial(_show, sentence(words)))
-
-
-def _show(words: str) -> None:
-    if windows := bpy.context.window_manager.windows:
-        with bpy.context.temp_override(window=windows[0]):
-            operator_bases.popup(bpy.context, words, title="Virtual Shutter", icon="INFO")
+        main_thread.soon(partial(render_job.popup, sentence(words), title="Virtual Shutter", icon="INFO"))
 
 
 def _before_save(*_) -> None:

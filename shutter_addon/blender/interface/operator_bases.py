@@ -38,12 +38,6 @@ def report(operator: Operator, sentence: str, kind: str = "WARNING") -> set[str]
     return {"CANCELLED"}
 
 
-def popup(context: Context, words: str, **looks: str) -> None:
-    """Show a translated sentence in a popup at the pointer."""
-    show = context.window_manager.popup_menu
-    show(lambda menu, _context: menu.layout.label(text=words, translate=False), **looks)
-
-
 def given(kind: Callable, name: str, description: str, **more: Any) -> Any:
     """Return a property of an operator that buttons set. Blender would otherwise reuse the last button's value.
 

@@ -296,11 +296,14 @@ def _cancel_and_show() -> None:
     """Cancel, and show the failure in the window, where reports of an engine in the sequencer do not arrive."""
     _cancel()
     if job.failure is not None:
-        text = sentence(job.failure)
-        with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
-            bpy.context.window_manager.popup_menu(
-                lambda menu, _context: menu.layout.label(text=text), title="Virtual Shutter", icon="ERROR"
-            )
+        popup(sentence(job.failure), title="Virtual Shutter", icon="ERROR")
+
+
+def popup(words: str, **looks: str) -> None:
+    """Show a translated sentence in a popup at the pointer."""
+    manager = bpy.context.window_manager
+    with bpy.context.temp_override(window=bpy.context.window or manager.windows[0]):
+        manager.popup_menu(lambda menu, _context: menu.layout.label(text=words, translate=False), **looks)
 
 
 def _cancel() -> None:
