@@ -285,7 +285,7 @@ def test_what_happens_to_its_region_ends_it_without_another_key(bpy, edit, regio
         region_edits.remove_region(effect, 0)
     elif change == "other":
         region_edits.add_region(effect, effect.shutters[1])
-        region_edits.move_region(effect, 1, 0)
+        region_edits.move(effect, "region", 1, 0)
     elif change == "move":
         effect.start += 3
     elif change == "effects":  # the collection is elsewhere in memory

@@ -135,10 +135,10 @@ def remove_region(effect: PropertyGroup, index: int) -> None:
     choose_region(effect)
 
 
-def move_region(effect: PropertyGroup, index: int, to: int) -> None:
-    """Move a region in the list. Later regions cover earlier ones."""
-    fcurves.move_item(effect, "regions", index, to)
-    effect.active_region = to
+def move(effect: PropertyGroup, kind: str, index: int, to: int) -> None:
+    """Move a "shutter" or a "region" in its list. The first shutter is the default, and later regions cover others."""
+    fcurves.move_item(effect, f"{kind}s", index, to)
+    setattr(effect, f"active_{kind}", to)
 
 
 def assign_region(effect: PropertyGroup, index: int, shutter: PropertyGroup) -> None:

@@ -1,6 +1,6 @@
 """Operators of effects, shutters, regions and recipes. Each calls a function of `editing`."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
@@ -17,15 +17,7 @@ from ...core.model.choices import CONTEXT, DRAWN
 from ...core.recipes import recipe_file
 from ..data import annotations, consistency, data_format, preview_areas, recipe_import, selection, strips
 from ..devices import main_thread
-from ..editing import (
-    add_effect,
-    bar_edits,
-    motion_keys,
-    region_edits,
-    shown_annotations,
-    shutter_edits,
-    undelete,
-)
+from ..editing import add_effect, bar_edits, motion_keys, region_edits, shown_annotations, shutter_edits, undelete
 from ..editing import match_source as matching
 from ..output import error_report, matte_export
 from . import needs, sharp_frame
@@ -158,20 +150,20 @@ def shutter_remove(_self: Operator, _context: Context, effect: PropertyGroup) ->
 _DIRECTION = EnumProperty(name="Direction", items=(("UP", "Up", ""), ("DOWN", "Down", "")), options={"SKIP_SAVE"})
 
 
-def _move(places: list[int], index: int, direction: str, move: Callable[[int, int], None]) -> set[str] | None:
-    """Move an item one place up or down among the places that the list shows."""
+def _move(effect: PropertyGroup, kind: str, direction: str, places: list[int]) -> set[str] | None:
+    """Move the active "shutter" or "region" one place up or down among those that the list shows."""
+    index = getattr(effect, f"active_{kind}")
     step = places.index(index) + (1 if direction == "DOWN" else -1)
     if not 0 <= step < len(places):
         return {"CANCELLED"}
-    move(index, places[step])
+    region_edits.move(effect, kind, index, places[step])
     return None
 
 
 @operator("Move Shutter", needs.a_shutter, direction=_DIRECTION)
 def shutter_move(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
     """Move the active shutter in the list (the first one is the default, used where nothing is drawn)"""
-    places = list(range(len(effect.shutters)))
-    return _move(places, effect.active_shutter, self.direction, partial(shutter_edits.move_shutter, effect))
+    return _move(effect, "shutter", self.direction, list(range(len(effect.shutters))))
 
 
 @kept
@@ -319,7 +311,7 @@ def region_move(self: Operator, _context: Context, effect: PropertyGroup) -> set
     """Move the active region in the list (later ones cover earlier ones)"""
     name = selection.active_shutter(effect).name
     places = [i for i, region in enumerate(effect.regions) if region.shutter == name]
-    return _move(places, effect.active_region, self.direction, partial(region_edits.move_region, effect))
+    return _move(effect, "region", self.direction, places)
 
 
 @operator("Choose Source", icon="SEQUENCE", strip=STRIP)
