@@ -143,25 +143,14 @@ def _draw_exposure(layout: UILayout, scene: Scene, effect: PropertyGroup, strip:
     layout.prop(shutter, "length")
     if shutter.length == "MOTION" and shutter.follow != "NOTHING":
         layout.prop(shutter, "trail")
-    _draw_combine(layout, shutter)
+    layout.prop(shutter, "combine")
+    if shutter.combine in ("LIGHTEST", "DARKEST"):
+        draw_properties(layout, shutter, "by_luminance", "use_threshold")
+        if shutter.use_threshold:
+            draw_properties(layout, shutter, "threshold", "softness")
     draw_properties(layout, shutter, *(field.blender for field in fields_of(Shutter).values() if field.shown))
     draw_operators(layout, "tripod")
     _draw_bars(layout, scene, effect, strip)
-
-
-def _draw_combine(layout: UILayout, shutter: PropertyGroup) -> None:
-    """Draw how the active shutter combines frames."""
-    layout.prop(shutter, "combine")
-    if shutter.combine not in ("LIGHTEST", "DARKEST"):
-        return
-    layout.prop(shutter, "by_luminance")
-    row = layout.row(heading="Threshold")
-    row.prop(shutter, "use_threshold", text="")
-    number = row.row()
-    number.active = shutter.use_threshold
-    number.prop(shutter, "threshold", text="")
-    if shutter.use_threshold:
-        layout.prop(shutter, "softness")
 
 
 def _draw_bars(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
@@ -271,7 +260,10 @@ def _draw_regions(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip
         draw_operators(row, *_BUTTONS.get(region.kind, _BUTTONS["LINE"]))
         row.menu("SHUTTER_MT_of_outline", text="", icon="DOWNARROW_HLT")
     if region.kind in strips.LAID:
-        _draw_blend(layout, region)
+        draw_properties(layout, region, "opacity", "feather", "invert")
+        if not region.is_layer:  # a layer covers all mattes below
+            layout.prop(region, "blend")
+        draw_operators(layout, "matte_export")
     try:
         validation.check_moving(region)
     except EffectError as error:
@@ -294,15 +286,6 @@ def _draw_matte(layout: UILayout, region: PropertyGroup) -> None:
         layout.prop(region, "channel")
         if region.channel == "NAMED":
             layout.prop(region, "channel_name", text="Name")
-
-
-def _draw_blend(layout: UILayout, region: PropertyGroup) -> None:
-    """Draw how a matte, ramp or outline blends with the mattes below."""
-    for name in ("opacity", "feather", "invert", "blend"):
-        row = layout.row()
-        row.active = name != "blend" or not region.is_layer  # a layer covers all of them
-        row.prop(region, name)
-    draw_operators(layout, "matte_export")
 
 
 def _draw_transform(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:
