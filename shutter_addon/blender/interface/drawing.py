@@ -154,13 +154,6 @@ def text(x: float, y: float, words: str, until: float | None = None) -> None:
     blf.disable(0, blf.CLIPPING)
 
 
-def plated(x: float, y: float, words: str) -> None:
-    """Draw text on a dark background."""
-    pad = 4 * ui_scale()
-    rectangles([(x - pad, y - pad - 1, x + text_width(words) + pad, y + SIZE * ui_scale() + pad)], [BACK])
-    text(x, y, words)
-
-
 def text_width(words: str) -> float:
     """Return the width of a text in pixels."""
     blf.size(0, SIZE * ui_scale())

@@ -268,8 +268,12 @@ def draw_notes(region: Region, notes: list[str]) -> None:
     unit = drawing.ui_scale()
     left, right = 16 * unit, region.width - _NAVIGATION * unit
     lines = [line for note in notes for line in drawing.wrapped(note, right - left, drawing.SIZE)]
+    pad = 4 * unit
     for i, line in enumerate(lines):
-        drawing.plated(left, region.height - (36 + 18 * i) * unit, line)
+        y = region.height - (36 + 18 * i) * unit
+        box = left - pad, y - pad - 1, left + drawing.text_width(line) + pad, y + drawing.SIZE * unit + pad
+        drawing.rectangles([box], [drawing.BACK])
+        drawing.text(left, y, line)
 
 
 classes = (ShutterPreview,)

@@ -226,8 +226,7 @@ def render_frames(scene: Scene, output: Path, moved: Callable[[], None], move: M
         place = blender_path(str(part_film) if is_film else f"{part}{os.sep}")
         try:
             with (
-                for_a_while([(scene.render, "filepath", place)]),
-                render_job.telling(faults.append),
+                for_a_while([(scene.render, "filepath", place), (render_job.job, "tell", faults.append)]),
                 stoppable() as stopped,
                 quiet(),
                 # Each frame is rendered once, and caches would take gigabytes.

@@ -12,7 +12,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, wait
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import partial
@@ -28,7 +28,6 @@ from bpy.types import Scene
 from ...core import threads
 from ...core.messages import sentence, signed
 from ...devices.device import Budget
-from ..data.property_copy import for_a_while
 from ..data.snapshot import Snapshot
 from ..data.strips import ENGINE
 from ..devices import main_thread
@@ -211,11 +210,6 @@ def operators_running() -> set[str]:
     """Return the names of the modal operators of all windows."""
     windows = bpy.context.window_manager.windows
     return {operator.bl_idname for window in windows for operator in window.modal_operators}
-
-
-def telling(to: Callable[[str], None]) -> AbstractContextManager[None]:
-    """Inside a `with` block, pass the sentence that ends a render in the background to a function, not to stderr."""
-    return for_a_while([(job, "tell", to)])
 
 
 @contextmanager
