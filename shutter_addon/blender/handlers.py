@@ -6,6 +6,7 @@ import inspect
 import sys
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 from types import TracebackType
 
 import bpy
@@ -15,6 +16,7 @@ from bpy.types import Depsgraph, Scene
 from .. import features
 from ..core import recent_errors, revision
 from ..core.messages import sentence
+from ..media import blender_movie
 from .data import data_format, preview_areas, source_media, strips, versions
 from .devices import main_thread
 from .editing import reconcile as reconciling
@@ -155,6 +157,9 @@ def _uncaught(
     before(kind, error, trace)
 
 
+# Options of a Blender without user settings and network.
+_ALONE = "--background", "--factory-startup", "--offline-mode", "-noaudio"
+
 HANDLERS = {
     "load_pre": _forget_file,
     "load_post": _after_load,
@@ -173,6 +178,11 @@ HANDLERS = {
 
 
 def register() -> None:
+    script = str(Path(__file__).with_name("data") / "decoding_process.py")  # decodes movies where PyAV is missing
+    if bpy.app.binary_path:
+        blender_movie.lend([bpy.app.binary_path, *_ALONE, "--python", script, "--"])
+    else:  # Blender as a library
+        blender_movie.lend([sys.executable, script])
     for name, function in HANDLERS.items():
         getattr(bpy.app.handlers, name).append(persistent(function))
     sys.excepthook = partial(_uncaught, sys.excepthook)
@@ -181,6 +191,7 @@ def register() -> None:
 
 
 def unregister() -> None:
+    blender_movie.lend(None)
     for name, function in HANDLERS.items():
         getattr(bpy.app.handlers, name).remove(function)
     if isinstance(ours := sys.excepthook, partial) and ours.func is _uncaught:  # not one that was installed later
