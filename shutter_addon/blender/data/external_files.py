@@ -75,11 +75,11 @@ def _of_strips(scene: Scene, frames: range, kinds: tuple[str, ...], *, sources: 
 
 def _of_strip(strip: Strip, frames: range) -> Iterator[str]:
     if strip.type == "MOVIE":
-        yield from fault(_open, absolute(strip, strip.filepath))
+        yield from raised(_open, absolute(strip, strip.filepath))
     elif strip.type == "IMAGE":
         elements = {element.filename for frame in frames if (element := strip.strip_elem_from_frame(frame))}
         folder = absolute(strip, strip.directory)
-        yield from [fault for name in sorted(elements) for fault in fault(check_file, folder / name)][:1]
+        yield from [fault for name in sorted(elements) for fault in raised(check_file, folder / name)][:1]
     elif strip.type == "MOVIECLIP":
         yield from _of_item(strip.clip) if strip.clip else ["it has no clip"]
     elif strip.type == "SOUND":
@@ -89,10 +89,10 @@ def _of_strip(strip: Strip, frames: range) -> Iterator[str]:
 def _of_item(item: ID, check: Callable = check_file) -> Iterator[str]:
     """Yield faults of a data-block's files; of a sequence, of its first. `check` raises MediaError for a file."""
     for path in named(item):
-        yield from fault(check, path)
+        yield from raised(check, path)
 
 
-def fault(check: Callable, *arguments) -> list[str]:
+def raised(check: Callable, *arguments) -> list[str]:
     """Return the message of the error that a check of `arguments` raises, if it does."""
     try:
         check(*arguments)
