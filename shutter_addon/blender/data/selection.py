@@ -75,14 +75,8 @@ def visible(scene: Scene) -> list:
     if not editor:
         return []
     level = editor.meta_stack[-1] if editor.meta_stack else editor
-    return [
-        strip
-        for strip in level.strips
-        if strips.is_at(strip, frame)
-        and strip.type != "SOUND"
-        and not strip.mute
-        and not level.channels[strip.channel].mute
-    ]
+    here = [strip for strip in level.strips if strips.is_at(strip, frame) and strip.type != "SOUND"]
+    return [strip for strip in here if not (strip.mute or level.channels[strip.channel].mute)]
 
 
 def why_unseen(scene: Scene, strip: Strip) -> str:

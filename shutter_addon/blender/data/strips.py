@@ -154,10 +154,8 @@ def nearest_source(scene: Scene, effect: PropertyGroup, strip: Strip) -> Any:
         channels = other.channel - strip.channel
         return apart, elsewhere, other not in connected, channels > 0, abs(channels)
 
-    candidates = [
-        other for other in identified(scene, "virtual_shutter_source", effect.source) if other.type in SOURCES
-    ]
-    return min(candidates, key=distance, default=None)
+    found = [other for other in identified(scene, "virtual_shutter_source", effect.source) if other.type in SOURCES]
+    return min(found, key=distance, default=None)
 
 
 def identified(scene: Scene, name: str, identity: str) -> list:
