@@ -143,9 +143,7 @@ def _after_render(scene: Scene, *_) -> None:
     render_job.end(scene, alone=not render_job.script_waits(inspect.currentframe()))
 
 
-def _uncaught(
-    before: Callable[..., object], kind: type[BaseException], error: BaseException, trace: TracebackType | None
-) -> None:
+def _uncaught(before: Callable, kind: type, error: BaseException, trace: TracebackType | None) -> None:
     """Keep errors of the extension for Copy Report.
 
     Blender prints what operators, panels, handlers and timers raise, which calls sys.excepthook. Nothing else gets all.

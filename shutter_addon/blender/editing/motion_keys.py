@@ -188,9 +188,7 @@ def check_curves(effect: PropertyGroup, index: int | None) -> None:
                     raise EffectError(rpt_(sentence).format(place=validation.place(moving), channel=label))
 
 
-def insert(
-    effect: PropertyGroup, index: int | None, channels: Sequence[str] = CHANNELS, *, begins: bool = False
-) -> None:
+def insert(effect: PropertyGroup, index: int | None, names: Sequence[str] = CHANNELS, *, begins: bool = False) -> None:
     """Key channels of a region or the camera at the scene's current frame, as the user's keyframes with full
     confidence.
 
@@ -206,7 +204,7 @@ def insert(
     path, pace, frame = moving.path_from_id(), fcurves.stretched(scene), scene.frame_current
     if not begins and pace != 1:
         frame = round(frame / pace, 3)
-    for name in channels:
+    for name in names:
         tracked = [_tracked_value(curve, frame) for curve in _curves(scene, f"{path}.{name}")]
         # Without a frame, Blender would use the one of the window's scene, which may be another one.
         scene.keyframe_insert(f"{path}.{name}", group=moving.name, frame=frame * pace)

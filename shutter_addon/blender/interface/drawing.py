@@ -59,10 +59,8 @@ def pixel_space(region: Region) -> Iterator[None]:
     """Use the region's pixels as coordinates. Blender's own state varies between draw handlers."""
     with gpu.matrix.push_pop(), gpu.matrix.push_pop_projection():
         gpu.matrix.load_identity()
-        width, height = region.width, region.height
-        gpu.matrix.load_projection_matrix(
-            Matrix(((2 / width, 0, 0, -1), (0, 2 / height, 0, -1), (0, 0, 1, 0), (0, 0, 0, 1)))
-        )
+        x, y = 2 / region.width, 2 / region.height
+        gpu.matrix.load_projection_matrix(Matrix(((x, 0, 0, -1), (0, y, 0, -1), (0, 0, 1, 0), (0, 0, 0, 1))))
         yield
 
 

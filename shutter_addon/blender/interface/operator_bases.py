@@ -124,26 +124,21 @@ class OfEffect(Named):
 
 
 def operator(
-    label: str,
-    *needs: Need,
-    icon: str = "NONE",
-    options: set[str] = UNDOABLE,
-    only_seen: bool = False,
-    **properties: Any,
+    label: str, *needs: Need, icon: str = "NONE", options: set[str] = UNDOABLE, only_seen: bool = False, **own: Any
 ) -> Callable[[Change], type[Operator]]:
     """Make an operator from a function that changes an effect. Its name, label and docstring become the operator's.
 
-    Other arguments are those of OfEffect, and properties of the operator, of which menus show the choices of the first.
+    Other arguments are those of OfEffect, and its `own` properties, of which menus show the choices of the first.
     """
 
     def made(change: Change) -> type[Operator]:
         content = {
             "__doc__": change.__doc__,
             "__module__": change.__module__,
-            "__annotations__": properties,
+            "__annotations__": own,
             "bl_label": label,
             "icon": icon,
-            "choices": next((name for name, made in properties.items() if made.function is EnumProperty), ""),
+            "choices": next((name for name, made in own.items() if made.function is EnumProperty), ""),
             "bl_options": options,
             "only_seen": only_seen,
             "needs": needs,

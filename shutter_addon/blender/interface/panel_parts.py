@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 from functools import cache
-from typing import Any
 
 import bpy.utils.previews
 import numpy as np
@@ -91,12 +90,7 @@ def draw_properties(layout: UILayout, owner: bpy.types.bpy_struct, *names: str) 
 
 
 def panel(
-    end: str,
-    label: str,
-    draws: Draws,
-    shows: Callable[[PropertyGroup], Any] | None = None,
-    within: str = "",
-    **look: object,
+    end: str, label: str, draws: Draws, shows: Callable | None = None, within: str = "", **look: object
 ) -> type[Panel]:
     """Make a panel of the Shutter tab that shows the effect, closed by default.
 

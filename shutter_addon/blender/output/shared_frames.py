@@ -64,14 +64,12 @@ def render(scene: Scene, folder: Path, file_format: str, version: EditVersion, *
     with film_output.progress(len(pictures), "frame") as moved:
         write = partial(film_output.render_frames, scene, folder, moved, move)
         if resume:
-            _render_missing(scene, folder, pictures, version.key, write, moved)
+            _resume(scene, folder, pictures, version.key, write, moved)
         else:
             write()
 
 
-def _render_missing(
-    scene: Scene, folder: Path, missing: dict[int, Path], key: str, write: Callable, moved: Callable
-) -> None:
+def _resume(scene: Scene, folder: Path, missing: dict[int, Path], key: str, write: Callable, moved: Callable) -> None:
     waits = False
     with Claims(folder) as claims, film_output.stoppable() as stopped:
         while missing:

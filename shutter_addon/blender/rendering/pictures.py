@@ -113,7 +113,6 @@ def resized(picture: np.ndarray, width: int, height: int, divisor: int = 1) -> n
         picture = picture.repeat(divisor, axis=0).repeat(divisor, axis=1)[:height, :width]
     if picture.shape[:2] == (height, width):
         return picture
-    small = OpenImageIO.ImageBufAlgo.resize(
-        OpenImageIO.ImageBuf(np.ascontiguousarray(picture)), roi=OpenImageIO.ROI(0, width, 0, height)
-    )
+    whole = OpenImageIO.ImageBuf(np.ascontiguousarray(picture))
+    small = OpenImageIO.ImageBufAlgo.resize(whole, roi=OpenImageIO.ROI(0, width, 0, height))
     return np.asarray(small.get_pixels(OpenImageIO.FLOAT)).reshape(height, width, 4)

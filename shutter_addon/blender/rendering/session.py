@@ -113,11 +113,9 @@ class RenderContext:
             if (request.source, request.levels, request.display) == (key, self.levels, self.display):
                 return request
         with translated(rpt_):
-            index, state, direction = state_at(snapshot.effect, clip_of(snapshot, source), frame)
+            index, state, way = state_at(snapshot.effect, clip_of(snapshot, source), frame)
         state = state.in_blocks(max(state.options.aggregate // key.detail.divisor, 1))
-        request = Request(
-            index=index, state=state, direction=direction, source=key, levels=self.levels, display=self.display
-        )
+        request = Request(index=index, state=state, direction=way, source=key, levels=self.levels, display=self.display)
         session.requests[key.place] = snapshot, frame, request
         return request
 
