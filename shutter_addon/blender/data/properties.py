@@ -27,8 +27,9 @@ from ...core.model.choices import CONTEXT, FOLLOWED, FOLLOWS, KINDS, MATTE_SOURC
 from ...core.model.fields import Field, fields_of
 from ...core.model.frame_state import Options
 from ...core.model.limits import MAX_BAR, MAX_CHANNEL, MAX_DEGREES, MAX_DISTANCE, MAX_FRAME, MAX_NAME, MAX_SCALE
-from . import consistency, matte_content, selection
+from . import consistency, selection
 from .consistency import changed
+from .matte_content import choose_strip, strip_name
 
 KEYED = {"ANIMATABLE"}  # Blender's default
 _DISTANCES, _TURN = {"min": -MAX_DISTANCE, "max": MAX_DISTANCE}, math.radians(MAX_DEGREES)
@@ -123,19 +124,12 @@ class _Moving:
     rotation: labelled(FloatProperty, "Rotation", "Rotation about the center", subtype="ANGLE", min=-_TURN, max=_TURN)
     scale: labelled(FloatProperty, "Scale", "Scale about the center", default=1.0, min=-MAX_SCALE, max=MAX_SCALE)
     confidence: FloatProperty(
-        name="Confidence",
-        description="How certain the tracked position is",
-        subtype="PERCENTAGE",
-        default=100.0,
-        min=0.0,
-        max=100.0,
+        name="Confidence", description="How certain the position is", subtype="PERCENTAGE", default=100, min=0, max=100
     )
     stops: CollectionProperty(type=TrackStop)
     motion: setting(EnumProperty, "Motion", "Which channels Track and Follow key", items=MOTIONS, default="SCALE")
     track_until: setting(IntProperty, "Until", "Timeline frame at which tracking stops; 0 is the end of the strip")
-    track_all_keys: setting(
-        BoolProperty, "All Keys", "Key every tracked frame, not only those that the motion needs within a pixel"
-    )
+    track_all_keys: setting(BoolProperty, "All Keys", "Key every tracked frame, not only where the motion needs it")
     track_ends: setting(
         BoolProperty,
         "Fade Out When Lost",
@@ -162,23 +156,13 @@ class ShutterRegion(_Moving, PropertyGroup):
     image: labelled(PointerProperty, "File", "Movie, image sequence or picture that is the matte", type=bpy.types.Image)
     strip: labelled(StringProperty, "Strip", "Identity of the strip that is the matte")
     strip_name: StringProperty(
-        name="Strip",
-        description="Strip that is the matte",
-        get=matte_content.strip_name,
-        set=matte_content.choose_strip,
-        options={"SKIP_SAVE"},
+        name="Strip", description="Strip that is the matte", get=strip_name, set=choose_strip, options={"SKIP_SAVE"}
     )
     mask: labelled(PointerProperty, "Mask", "Mask that is the matte", type=bpy.types.Mask)
     channel_name: labelled(StringProperty, "Channel Name", "Name of the channel in the EXR file", maxlen=MAX_CHANNEL)
-    follow_clip: PointerProperty(
-        name="Clip",
-        description="Movie clip of the source's footage, in which something is tracked",
-        type=bpy.types.MovieClip,
-    )
+    follow_clip: PointerProperty(name="Clip", description="Movie clip that has the track", type=bpy.types.MovieClip)
     follow_kind: choice("Follow Track", "What the region follows", FOLLOWED, update=None, default="TRACK")
-    follow_object: StringProperty(
-        name="Object", description="Tracking object that has the tracks; without one, the camera"
-    )
+    follow_object: StringProperty(name="Object", description="Tracking object that has the tracks; empty: the camera")
     follow_track: StringProperty(name="Track", description="Name of the track or plane track that is followed")
 
 
@@ -212,9 +196,7 @@ def _region_selected(effect: PropertyGroup, _context: Context) -> None:
 
 
 class ShutterBar(PropertyGroup):
-    weight: labelled(
-        FloatProperty, "Weight", "Contribution of the bar's frame", default=1.0, min=0.0, max=MAX_BAR, soft_max=1.0
-    )
+    weight: labelled(FloatProperty, "Weight", "Contribution of its frame", default=1, min=0, max=MAX_BAR, soft_max=1)
 
 
 @with_fields(model.Shutter, name={"set_transform": _shutter_renamed}, color={"update": _shutter_recolored})
@@ -238,12 +220,7 @@ class _Settings:
     source: StringProperty(name="Source", description="Identity of the source strip")
     start: FloatProperty(name="Start", description="Timeline frame where the effect's content starts", options=set())
     camera: PointerProperty(name="Camera", description="Motion of what the camera sees", type=ShutterCamera)
-    use_source_time: labelled(
-        BoolProperty,
-        "Custom Time",
-        "Show the source at the time that is set here, not at the strip's own",
-        options=set(),
-    )
+    use_source_time: labelled(BoolProperty, "Custom Time", "Show the source at the time set here", options=set())
     source_time: labelled(
         FloatProperty,
         "Source Time",

@@ -26,9 +26,7 @@ class SHUTTER_OT_matte_add(OfEffect, ImportHelper, Operator):
     icon = "FILE_MOVIE"
     needs = (needs.room_for_a_region,)
 
-    channel_name: given(
-        StringProperty, "Channel Name", "Name of a channel of an EXR file; empty for the luminance", maxlen=MAX_CHANNEL
-    )
+    channel_name: given(StringProperty, "Channel Name", "Channel of an EXR file; empty: luminance", maxlen=MAX_CHANNEL)
     # What the file browser shows
     filter_movie: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
     filter_image: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})

@@ -202,7 +202,7 @@ class SHUTTER_OT_bar_set(OfEffect, Operator):
     needs = (needs.a_shutter,)
 
     bar: IntProperty(name="Bar", description="Number of the bar, from 1", default=1, min=1)
-    weight: FloatProperty(name="Weight", description="Contribution of the bar's frame", min=0.0, soft_max=1.0)
+    weight: FloatProperty(name="Weight", description="Contribution of its frame", min=0.0, soft_max=1.0)
 
     def invoke(self, context: Context, event: Event) -> set[str]:
         if event.value == "DOUBLE_CLICK":  # from a menu, the pointer is anywhere

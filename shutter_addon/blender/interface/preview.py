@@ -68,9 +68,7 @@ class _Settings:
     split: float = Labelled(
         "Split Position", "Border between source and result, as a fraction of the picture's width"
     ).fixed(default=0.5, subtype="FACTOR")
-    probe: bool = Labelled(
-        "Probe", "Show the bars of the pixel under the pointer, and its share of each shutter"
-    ).switch()
+    probe: bool = Labelled("Probe", "Show bars of the pixel under the pointer, and its share of each shutter").switch()
     probe_at: tuple[float, float] = Labelled(
         "Probe Position", "Position of the probe, as fractions of the picture from its lower left corner"
     ).fixed(default=(-1.0, -1.0), least=-1e3, most=1e3)

@@ -302,7 +302,7 @@ MESSAGES = {
     ("*", "Bar"): "Balken",
     ("*", "Number of the bar, from 1"): "Nummer des Balkens, ab 1",
     ("*", "Weight"): "Gewicht",
-    ("*", "Contribution of the bar's frame"): "Wie viel das Bild des Balkens beiträgt",
+    ("*", "Contribution of its frame"): "Wie viel sein Bild beiträgt",
     ("*", "The shutter has {count} bars"): "Der Verschluss hat {count} Balken",
     ("Operator", "Paint Bars"): "Balken malen",
     # Regions
@@ -688,7 +688,7 @@ MESSAGES = {
     ("*", "Channel Name"): "Kanalname",
     (
         "*",
-        "Name of a channel of an EXR file; empty for the luminance",
+        "Channel of an EXR file; empty: luminance",
     ): "Name eines Kanals einer EXR-Datei; leer für die Leuchtdichte",
     ("*", "Name of the channel in the EXR file"): "Name des Kanals in der EXR-Datei",
     ("*", "Invert"): "Invertieren",
@@ -947,7 +947,7 @@ MESSAGES = {
     ("*", "Probe"): "Sonde",
     (
         "*",
-        "Show the bars of the pixel under the pointer, and its share of each shutter",
+        "Show bars of the pixel under the pointer, and its share of each shutter",
     ): "Verschluss des Pixels zeigen, über dem der Zeiger zuletzt war, und wie viel er von jedem erhält",
     ("*", "Probe Position"): "Ort der Sonde",
     (
@@ -1002,8 +1002,8 @@ MESSAGES = {
     ("Virtual Shutter", "All Keys"): "Alle Schlüsselbilder",
     (
         "*",
-        "Key every tracked frame, not only those that the motion needs within a pixel",
-    ): "Jedes verfolgte Bild bekommt ein Schlüsselbild, nicht nur, wo die Bewegung es auf ein Pixel genau braucht",
+        "Key every tracked frame, not only where the motion needs it",
+    ): "Jedes verfolgte Bild bekommt ein Schlüsselbild, nicht nur, wo die Bewegung es braucht",
     ("*", "Tracking: {done} of {total} frames, Esc to stop"): "Verfolgt: {done} von {total} Bildern, Esc hält an",
     (
         "*",
@@ -1020,7 +1020,7 @@ MESSAGES = {
     ): "Ab Frame {frame} bewegen sich Nah und Fern verschieden, oder es ist zu wenig zu sehen: nicht alles steht still",
     ("*", "Tracking stopped at frame {frame}: {fault}"): "Das Verfolgen hielt bei Bild {frame} an: {fault}",
     ("*", "Confidence"): "Sicherheit",
-    ("*", "How certain the tracked position is"): "Wie sicher das Verfolgen war, wo es ist",
+    ("*", "How certain the position is"): "Wie sicher das Verfolgen war, wo es ist",
     ("*", "Confidence: {percent} %"): "Sicherheit: {percent} %",
     ("Operator", "Next Unsure Frame"): "Nächstes unsicheres Bild",
     ("Operator", "Next Unsure Camera Frame"): "Nächstes unsicheres Bild der Kamera",
@@ -1186,11 +1186,11 @@ MESSAGES = {
     ("*", "Clip"): "Clip",
     (
         "*",
-        "Movie clip of the source's footage, in which something is tracked",
-    ): "Filmclip vom Material der Quelle, in dem etwas verfolgt ist",
+        "Movie clip that has the track",
+    ): "Filmclip mit der Spur",
     (
         "*",
-        "Tracking object that has the tracks; without one, the camera",
+        "Tracking object that has the tracks; empty: the camera",
     ): "Verfolgungsobjekt mit den Spuren; ohne eines die Kamera",
     (
         "*",
@@ -1246,8 +1246,8 @@ MESSAGES = {
     ("*", "Custom Time"): "Eigene Zeit",
     (
         "*",
-        "Show the source at the time that is set here, not at the strip's own",
-    ): "Die Quelle zu der Zeit zeigen, die hier eingestellt ist, anstelle der Zeit des Streifens",
+        "Show the source at the time set here",
+    ): "Die Quelle zu der Zeit zeigen, die hier eingestellt ist",
     ("*", "Source Time"): "Quellzeit",
     (
         "*",
