@@ -29,8 +29,8 @@ def main(argv: list[str]) -> int:
         for path in vars(arguments).values():
             if isinstance(path, Path):
                 check_name(path)
-        chosen = [getattr(arguments, name, None) for name in ("device", "weights", "gpu_memory")]
-        with render_settings.using(*chosen):
+        names = "device", "weights", "gpu_memory"
+        with render_settings.using(**{name: getattr(arguments, name, None) for name in names}):
             arguments.run(arguments)
     except SystemExit as stop:  # argparse, after --help or a message on stderr
         return int(stop.code or 0)

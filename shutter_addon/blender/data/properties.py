@@ -131,11 +131,7 @@ class _Moving:
     track_until: setting(IntProperty, "Until", "Timeline frame at which tracking stops; 0 is the end of the strip")
     track_all_keys: setting(BoolProperty, "All Keys", "Key every tracked frame, not only where the motion needs it")
     track_ends: setting(
-        BoolProperty,
-        "Fade Out When Lost",
-        "Track keys a region's opacity, or the camera's influence, so that it fades where the track ends; "
-        "a region ends with its shot",
-        default=True,
+        BoolProperty, "Fade Out When Lost", "Fade a region or the camera out where the track ends", default=True
     )
 
 

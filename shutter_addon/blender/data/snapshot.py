@@ -211,12 +211,8 @@ def check_counts(effect: PropertyGroup) -> None:
     """Raise EffectError where an effect has no shutter, or too many shutters or regions."""
     if not effect.shutters:
         raise EffectError(rpt_('"{effect}" has no shutter').format(effect=effect.name))
-    for sentence, items, most in (
-        (rpt_("{place}: {count} shutters, but at most {most} are possible"), effect.shutters, limits.MAX_SHUTTERS),
-        (rpt_("{place}: {count} regions, but at most {most} are possible"), effect.regions, limits.MAX_REGIONS),
-    ):
-        if len(items) > most:
-            raise EffectError(sentence.format(place=validation.place(effect), count=len(items), most=most))
+    if full := validation.why_full(effect):
+        raise EffectError(f"{validation.place(effect)}: {full}")
 
 
 def _options(sampling: Sampling) -> keyframes.Channel:

@@ -13,7 +13,6 @@ from bpy.types import AnnotationLayer, PropertyGroup, Strip
 
 from ...core import revision
 from ...core.messages import EffectError
-from ...core.model import limits
 from ...core.model.effect import Drawings
 from ...core.model.motions import Placement
 from ...core.model.outlines import Curves
@@ -23,15 +22,6 @@ from ..data.annotations import LAYERS, NOT_THIS, annotation, layer_of, layers_of
 from ..data.consistency import bars, choose_region, color_layers, forget_followed, unique
 from ..data.sampled import Sampling
 from . import motion_keys
-
-
-def why_full(effect: PropertyGroup, *, regions: int = 0, shutters: int = 0) -> str | None:
-    """Return why an effect cannot have this many more regions and shutters; None: it can."""
-    if regions and len(effect.regions) + regions > limits.MAX_REGIONS:
-        return rpt_("An effect can have at most {most} regions").format(most=limits.MAX_REGIONS)
-    if shutters and len(effect.shutters) + shutters > limits.MAX_SHUTTERS:
-        return rpt_("An effect can have at most {most} shutters").format(most=limits.MAX_SHUTTERS)
-    return None
 
 
 def add_region(

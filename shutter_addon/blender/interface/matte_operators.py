@@ -12,7 +12,7 @@ from bpy_extras.io_utils import ImportHelper
 from ...core.messages import UserError
 from ...core.model.choices import RAMPS
 from ...core.model.limits import MAX_CHANNEL
-from ..data import matte_content, recipe_import, selection, strips
+from ..data import matte_content, recipe_import, selection, strips, validation
 from ..editing import region_edits, shutter_edits
 from ..output import matte_export
 from . import needs
@@ -92,7 +92,7 @@ def ramp_add(self: Operator, _context: Context, effect: PropertyGroup) -> None:
 
 
 def _why_no_time_map(effect: PropertyGroup) -> str | None:
-    return region_edits.why_full(effect, regions=1, shutters=2)
+    return validation.why_full(effect, regions=1, shutters=2)
 
 
 @operator("Time Map", needs.a_shutter, _why_no_time_map, icon="TIME", ramp=_RAMP)

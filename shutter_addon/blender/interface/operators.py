@@ -15,7 +15,7 @@ from ...core.messages import EffectError, UserError
 from ...core.model import shutters
 from ...core.model.choices import CONTEXT, DRAWN
 from ...core.recipes import recipe_file
-from ..data import annotations, consistency, data_format, preview_areas, recipe_import, selection, strips
+from ..data import annotations, consistency, data_format, preview_areas, recipe_import, selection, strips, validation
 from ..devices import main_thread
 from ..editing import add_effect, bar_edits, motion_keys, region_edits, shown_annotations, shutter_edits, undelete
 from ..editing import match_source as matching
@@ -229,7 +229,7 @@ class SHUTTER_OT_bar_set(OfEffect, Operator):
 
 
 def _why_no_room(effect: PropertyGroup) -> str | None:
-    return region_edits.why_full(effect, regions=1 if selection.active_region(effect) is None else 0)
+    return validation.why_full(effect, regions=1 if selection.active_region(effect) is None else 0)
 
 
 class SHUTTER_OT_draw(MakesEffect, OfEffect, Operator):
@@ -249,7 +249,7 @@ class SHUTTER_OT_draw(MakesEffect, OfEffect, Operator):
         if self.not_this and (sentence := needs.a_subject(effect)):
             raise EffectError(sentence)
         if self.new or region is None or region.kind in strips.MATTES:
-            if sentence := region_edits.why_full(effect, regions=1):  # poll() does not know the value of `new`
+            if sentence := validation.why_full(effect, regions=1):  # poll() does not know the value of `new`
                 raise EffectError(sentence)
             region_edits.first_drawn(effect, selection.active_shutter(effect), self.kind)
         region_edits.begin_drawing(effect, self.effect_strip, effect.active_region)

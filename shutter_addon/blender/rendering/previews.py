@@ -253,14 +253,8 @@ def _is_drawn(context: Context, shown: Shown, look: Look, source: FrameSource, *
     """
     settings = context.window_manager.virtual_shutter
     is_small = source.from_proxy or source.width < annotations.picture_size(shown.effect)[0]
-    return (
-        settings.live
-        and (is_small or is_less or settings.view not in RESULTS)
-        and not shown.strips_above
-        and source.alpha == "opaque"
-        and look.is_plain
-        and not pen_is_down()
-    )
+    is_wanted = settings.live and (is_small or is_less or settings.view not in RESULTS)
+    return is_wanted and not shown.strips_above and source.alpha == "opaque" and look.is_plain and not pen_is_down()
 
 
 def _drafted(context: Context, shown: Shown, request: Request) -> Request:

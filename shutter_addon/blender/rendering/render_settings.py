@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager
-from pathlib import Path
 
 from ...devices.device import MEGABYTE, Budget, allowed
 from ..data import preferences
@@ -12,12 +11,9 @@ from ..devices import available
 from .render_job import job
 
 
-def using(
-    device: str | None = None, weights: Path | None = None, gpu_memory: int | None = None
-) -> AbstractContextManager[None]:
-    """Give renders these settings inside a `with` block, in a command."""
-    changes = {"device": device, "weights": weights, "gpu_memory": gpu_memory}
-    return for_a_while((job.settings, name, value) for name, value in changes.items())
+def using(**settings: object) -> AbstractContextManager[None]:
+    """Give renders these settings of a command inside a `with` block."""
+    return for_a_while((job.settings, name, value) for name, value in settings.items())
 
 
 def wanted() -> str:

@@ -113,14 +113,6 @@ MESSAGES = {
     ): "„{path}“ gespeichert, ohne das, was eine neuere Version von Virtual Shutter hinzugefügt hat",
     ("*", "{place}: {property} is none of its choices"): "{place}: {property} ist keine der Möglichkeiten",
     ("*", "{place}: {count} bars, and {window} frames"): "{place}: {count} Balken und {window} Bilder",
-    (
-        "*",
-        "{place}: {count} shutters, but at most {most} are possible",
-    ): "{place}: {count} Verschlüsse, höchstens {most} sind möglich",
-    (
-        "*",
-        "{place}: {count} regions, but at most {most} are possible",
-    ): "{place}: {count} Regionen, höchstens {most} sind möglich",
     ("*", "An effect can have at most {most} shutters"): "Ein Effekt hat höchstens {most} Verschlüsse",
     ("*", "An effect can have at most {most} regions"): "Ein Effekt hat höchstens {most} Regionen",
     (
@@ -1073,10 +1065,8 @@ MESSAGES = {
     ("Virtual Shutter", "Fade Out When Lost"): "Ausblenden, wenn verloren",
     (
         "*",
-        "Track keys a region's opacity, or the camera's influence, so that it fades where the track ends; "
-        "a region ends with its shot",
-    ): "Verfolgen gibt der Deckkraft einer Region, oder dem Einfluss der Kamera, Schlüsselbilder: Sie klingt aus, "
-    "wo die Verfolgung endet; eine Region endet mit ihrer Einstellung",
+        "Fade a region or the camera out where the track ends",
+    ): "Eine Region oder die Kamera ausblenden, wo die Verfolgung endet",
     ("*", "Part of the motion that the exposure follows"): "Was von der Bewegung gilt",
     ("*", "Smoothness"): "Glätte",
     (
