@@ -101,8 +101,7 @@ def _before_render(scene: Scene, *_) -> None:
     if scene.render.engine == strips.ENGINE and render_job.where() is not Where.JOB:
         invalidation.drop_failed()
     if is_film and scene.render.engine != strips.ENGINE:
-        film = scene.session_uid
-        if not render_job.on_main_thread(partial(_prepare, film, render_job.where() is Where.JOB)):
+        if not render_job.on_main_thread(partial(_prepare, scene.session_uid, render_job.where() is Where.JOB)):
             render_job.fail("Blender's window did not answer, and the effects could not be read")
         edit_feed.begin(scene)
 

@@ -59,8 +59,7 @@ def recipe(path: Path) -> Effect:
     """Read a recipe. Print a warning if older versions showed another picture. RecipeError: it is invalid."""
     found = recipe_file.load(path)
     if found.lost is not None:
-        told = f"{path}: {found.lost}"  # not translated
-        render_job.say(told)
+        render_job.say(f"{path}: {found.lost}")  # not translated
     return found
 
 

@@ -144,8 +144,7 @@ def _setting_names(*kinds: type) -> list[str]:
 
 def _curves(owner: Scene, path: str, start: int | None) -> Iterator[Hashable]:
     """Yield what the F-curves say whose path starts with `path`, in the order of their paths."""
-    found = fcurves.curves_under(owner, path)
-    for curve in sorted(found, key=lambda curve: (curve.data_path, curve.array_index)):
+    for curve in sorted(fcurves.curves_under(owner, path), key=lambda curve: (curve.data_path, curve.array_index)):
         yield curve.data_path.removeprefix(path), curve.array_index, curve.mute, curve.extrapolation
         points = curve.keyframe_points
         for name in ("handle_left", "co", "handle_right"):

@@ -382,8 +382,7 @@ def recipe_of(scene: Scene, effect: PropertyGroup, strip: Strip, contents: Seque
     if effect.regions and image_to_picture(strip, picture_size(effect)) is None:
         raise EffectError(rpt_('strip "{strip}" is too small to find its scribbles').format(strip=strip.name))
     with translated(rpt_):
-        plain = read(scene, effect, strip, sorted({*shown, *keyed}))
-        return key_fitting.with_keys(plain, shown, contents)
+        return key_fitting.with_keys(read(scene, effect, strip, sorted({*shown, *keyed})), shown, contents)
 
 
 def _keyed(scene: Scene, effect: PropertyGroup) -> set[float]:

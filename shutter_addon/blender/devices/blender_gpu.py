@@ -187,8 +187,7 @@ class BlenderDevice(Device):
 
 def texel(texture: Texture, x: int, y: int) -> np.ndarray:
     """Return the numbers (4 · layers,) float32 of all layers of an rgba32f texture at one texel."""
-    layers = texture.size[2]
-    values = np.empty((layers, 4), np.float32)
+    values = np.empty((texture.size[2], 4), np.float32)
     for layer, pixel in enumerate(values):
         _read_layer(texture.gpu, layer, (x, y, 1, 1), 4, "FLOAT", pixel)
     return values.reshape(-1)

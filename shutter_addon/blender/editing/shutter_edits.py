@@ -66,8 +66,7 @@ def apply_preset(effect: PropertyGroup, index: int, preset: str, key: bool = Fal
     """
     shutter, window = effect.shutters[index], validation.number(effect, "window")
     shutter.preset, shutter.preset_position = preset, effect.position
-    weights = shutters.preset_bars(preset, window, effect.position.lower())
-    bar_edits.paint(effect, index, weights, key)
+    bar_edits.paint(effect, index, shutters.preset_bars(preset, window, effect.position.lower()), key)
 
 
 def _free_color(effect: PropertyGroup) -> tuple[float, float, float]:
@@ -131,8 +130,7 @@ def as_layer(effect: PropertyGroup, index: int, own: str, rest: str, key: bool =
     region = effect.regions[index]
     place = effect.shutters.find(region.shutter)
     if place <= 0 or any(other.shutter == region.shutter for other in effect.regions if other != region):
-        names = {shutter.name for shutter in effect.shutters}
-        shutter = add_shutter(effect, unique(data_("Subject"), names))
+        shutter = add_shutter(effect, unique(data_("Subject"), {shutter.name for shutter in effect.shutters}))
         assign_region(effect, index, shutter)
         place = len(effect.shutters) - 1
     effect.regions[index].is_layer = True

@@ -253,9 +253,7 @@ class SHUTTER_OT_draw(MakesEffect, OfEffect, Operator):
                 raise EffectError(sentence)
             region_edits.first_drawn(effect, selection.active_shutter(effect), self.kind)
         region_edits.begin_drawing(effect, self.effect_strip, effect.active_region)
-        layer = "not_layer" if self.not_this else "layer"
-        if not drawing_tool(context, effect, "builtin.annotate", layer):
-            self.report({"INFO"}, "Open a sequencer with a preview to draw")
+        _take_tool(self, context, effect, "builtin.annotate", "not_layer" if self.not_this else "layer")
         sharp_frame.show(context)
 
 
@@ -263,18 +261,14 @@ class SHUTTER_OT_draw(MakesEffect, OfEffect, Operator):
 def erase(self: Operator, context: Context, effect: PropertyGroup) -> None:
     """Erase strokes of the active region in the preview"""
     region_edits.begin_drawing(effect, self.effect_strip, effect.active_region, erases=True)
-    if not drawing_tool(context, effect, "builtin.annotate_eraser"):
-        self.report({"INFO"}, "Open a sequencer with a preview to erase")
+    _take_tool(self, context, effect, "builtin.annotate_eraser")
 
 
-def drawing_tool(context: Context, effect: PropertyGroup, tool: str, layer: str = "layer") -> bool:
+def _take_tool(by: Operator, context: Context, effect: PropertyGroup, tool: str, layer: str = "layer") -> None:
     """Make a layer of the active region the active annotation and activate a drawing tool in all previews.
 
     Args:
         layer: one of annotations.LAYERS.
-
-    Returns:
-        Whether there is a preview.
     """
     region = selection.active_region(effect)
     if annotations.layer_of(effect, region, layer) is None:
@@ -282,7 +276,8 @@ def drawing_tool(context: Context, effect: PropertyGroup, tool: str, layer: str 
     consistency.aim_pen(effect, layer)
     for _window, area in preview_areas.previews(context):
         shown_annotations.give(area.spaces.active, effect.scene.annotation)
-    return sharp_frame.take_up(context, tool)
+    if not sharp_frame.take_up(context, tool):
+        by.report({"INFO"}, "Open a sequencer with a preview to draw")
 
 
 @kept

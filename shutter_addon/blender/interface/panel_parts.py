@@ -122,8 +122,7 @@ def menu(name: str, label: str) -> Callable[[Callable[[UILayout, Context], None]
         def draw(self: Menu, context: Context) -> None:
             draws(self.layout, context)
 
-        content = {"__module__": draws.__module__, "bl_label": label, "draw": draw}
-        return type(f"SHUTTER_MT_{name}", (Menu,), content)
+        return type(f"SHUTTER_MT_{name}", (Menu,), {"__module__": draws.__module__, "bl_label": label, "draw": draw})
 
     return made
 

@@ -221,8 +221,7 @@ def _show_strokes(context: Context, quad: Quad, shown: Shown, snapshot: Snapshot
     if not context.space_data.show_overlays:
         return
     frame = shown.scene.frame_current
-    shapes = snapshot.effect.drawn_at(frame)
-    for is_hidden, shape in zip(shown.hides_strokes, shapes, strict=True):
+    for is_hidden, shape in zip(shown.hides_strokes, snapshot.effect.drawn_at(frame), strict=True):
         if is_hidden:
             continue
         color = (*shown.effect.shutters[shape.shutter].color, shape.opacity)
@@ -243,8 +242,7 @@ def _show_source(quad: Quad, shown: Shown, renderer: Renderer, request: Request,
     following = request.state.following
     moving = following and following.of([following.moving()[0]])
     plain = replace(request, state=FrameState(options=options, bars=still, following=moving), levels=True)
-    texture = renderer.draw(plain)
-    quad.draw("PICTURE", {"picture": texture}, 0.0, right, opacity=shown.strip.blend_alpha)
+    quad.draw("PICTURE", {"picture": renderer.draw(plain)}, 0.0, right, opacity=shown.strip.blend_alpha)
 
 
 def _show_shares(

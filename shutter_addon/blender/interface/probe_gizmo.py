@@ -39,8 +39,7 @@ def probed_at(renderer: Renderer, request: Request, point: Sequence[float]) -> t
     values = blender_gpu.texel(texture, column // block, row // block)[: len(request.state.bars)]
     values = np.maximum(values, 0).astype(np.float64)
     coefficients = values / values.sum()
-    state = renderer.slid(request, known=True).state
-    return coefficients, compositor.mixed_shutter(state, coefficients)
+    return coefficients, compositor.mixed_shutter(renderer.slid(request, known=True).state, coefficients)
 
 
 def layout(point: Sequence[float], size: tuple[int, int], count: int, unit: float) -> tuple[Box, Box, list[float]]:

@@ -82,8 +82,7 @@ class SHUTTER_GT_region(Dragged, Gizmo):
             scene, effect, strip = selection.active(context)
             region = selection.active_region(effect)
             numbers = region.location, np.degrees(region.rotation), region.scale
-            strokes = _strokes_now(scene, effect, strip)
-            for points in scribbles.transform(strokes, *numbers, seen.view.aspect):
+            for points in scribbles.transform(_strokes_now(scene, effect, strip), *numbers, seen.view.aspect):
                 drawing.lines(seen.view.on_region(points), _MARK, width=2)
         if not self.turns:
             drawing.lines([seen.centre, seen.corner], (1, 1, 1, 0.4))

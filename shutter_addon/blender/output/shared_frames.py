@@ -85,8 +85,7 @@ def _resume(scene: Scene, folder: Path, missing: dict[int, Path], key: str, writ
             elif missing:
                 if not waits:
                     awaited = frame_ranges.in_words(list(missing))
-                    words = f"{folder}: waiting for {awaited}, which other workers have claimed"
-                    render_job.say(words)
+                    render_job.say(f"{folder}: waiting for {awaited}, which other workers have claimed")
                 waits = True
                 time.sleep(_PAUSE)
 
@@ -100,11 +99,11 @@ def _claim_run(claims: Claims, missing: dict[int, Path], key: str, moved: Callab
     for frame, picture in list(missing.items()):
         if len(run) == RUN or (run and frame - 1 != run[-1]):
             break
-        if _is_finished(picture, key):
+        if rendered_pictures.read(picture, key) is not None:
             del missing[frame]
             moved()
         elif claims.take(_name(picture)):
-            if not _is_finished(picture, key):  # since the last look
+            if rendered_pictures.read(picture, key) is None:  # nobody has rendered it since the last look
                 run.append(frame)
                 continue
             claims.release(_name(picture))
@@ -116,8 +115,3 @@ def _claim_run(claims: Claims, missing: dict[int, Path], key: str, moved: Callab
 def _name(picture: Path) -> str:
     """Return the name of a picture's claim."""
     return f"{picture.stem}_{picture.suffix[1:]}"
-
-
-def _is_finished(picture: Path, key: str) -> bool:
-    """Return whether a picture is undamaged and of this version of the edit."""
-    return rendered_pictures.read(picture, key) is not None

@@ -169,8 +169,7 @@ class RenderSession:
         ended = threading.Event()
         if self.threaded:
             with suppress(RuntimeError):  # at Python's exit, threads take no more work
-                future = self._executor.submit(broken_off, ended.is_set, function, *arguments)
-                return Work(future, ended)
+                return Work(self._executor.submit(broken_off, ended.is_set, function, *arguments), ended)
         done: Future = Future()
         done.set_result(function(*arguments))
         return Work(done, ended)

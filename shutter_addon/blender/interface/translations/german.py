@@ -359,7 +359,6 @@ MESSAGES = {
         "*",
         "Erase strokes of the active region in the preview",
     ): "Striche der aktiven Region in der Vorschau ausradieren",
-    ("*", "Open a sequencer with a preview to erase"): "Zum Radieren einen Sequenzer mit Vorschau öffnen",
     ("Operator", "Assign Region to Shutter"): "Region einem Verschluss zuweisen",
     ("*", "Assign the active region to another shutter"): "Die aktive Region einem anderen Verschluss zuweisen",
     ("Operator", "Remove Region"): "Region entfernen",
