@@ -11,7 +11,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, St
 from bpy.types import Context, Event, Operator, PropertyGroup
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
-from ...core.messages import EffectError, UserError
+from ...core.messages import EffectError
 from ...core.model import shutters
 from ...core.model.choices import CONTEXT, DRAWN
 from ...core.recipes import recipe_file
@@ -364,10 +364,7 @@ class SHUTTER_OT_recipe_export(OfEffect, ExportHelper, Operator):
 
     def change(self, _context: Context, effect: PropertyGroup) -> None:
         path = chosen_file(self)
-        try:
-            recipe_file.save(matte_export.recipe_for(self.edit, effect, self.effect_strip, Path(path)), path)
-        except OSError as error:
-            raise UserError(f"{path}: {error.strerror or error}") from None
+        recipe_file.save(matte_export.recipe_for(self.edit, effect, self.effect_strip, Path(path)), path)
         if data_format.is_newer(self.edit):
             words = rpt_('Saved "{path}" without data of a newer version of Virtual Shutter')
             report(self, words.format(path=path))
