@@ -250,21 +250,19 @@ def _bars(sampling: Sampling, path: str, shutter: PropertyGroup, options: keyfra
             sentence = rpt_("{place}: {count} bars, and {window} frames")
             raise EffectError(sentence.format(place=validation.place(shutter), count=len(stored), window=window))
     if not keyed:
-        return keyframes.Bars(keyframes.Constant(_bars_over(shutter, stored, keyed, [0.0])[0.0]))
+        return keyframes.Bars(keyframes.Constant(_bars_over(shutter, keyed, [0.0])[0.0]))
     keys = curves.keys(list(keyed.values()))
     ways = _ways(list(keyed.values()), [frame for frame, _ease in keys], frames) if keys else {}
     needed = {*frames, *(end for ends, _share in ways.values() for end in ends)}
-    values = keyframes.Samples(_bars_over(shutter, stored, keyed, sorted(needed)))
+    values = keyframes.Samples(_bars_over(shutter, keyed, sorted(needed)))
     if not keys:  # curves of samples or of modifiers alone
         return keyframes.Bars(values)
     return keyframes.Bars(values, keys, keyframes.Samples({frame: share for frame, (_ends, share) in ways.items()}))
 
 
-def _bars_over(
-    shutter: PropertyGroup, stored: list[float], keyed: dict[int, FCurve], frames: list[float]
-) -> dict[float, np.ndarray | UserError]:
+def _bars_over(shutter: PropertyGroup, keyed: dict[int, FCurve], frames: Frames) -> dict[float, np.ndarray | UserError]:
     """Return the bars (L,) at each frame. `keyed` has the F-curves by index of the bar."""
-    rows = np.tile(np.array(stored), (len(frames), 1))
+    rows = np.tile(np.array([bar.weight for bar in shutter.bars]), (len(frames), 1))
     for i, curve in keyed.items():
         # A curve may go below 0, a bar may not. NaN stays NaN, and is refused below.
         rows[:, i] = np.clip([curve.evaluate(frame) for frame in frames], 0.0, limits.MAX_BAR)

@@ -49,8 +49,7 @@ def _part_at(parts: list[tuple[range, Snapshot]], scene_frame: float) -> Snapsho
 
 def end() -> None:
     """Forget all snapshots, after a job or a film."""
-    for known in (job.film_data.taken, job.film_data.read, job.film_data.pictures, job.film_data.left_out):
-        known.clear()
+    job.film_data = render_job.FilmData(feed=job.film_data.feed)
     sessions.end_job()
 
 

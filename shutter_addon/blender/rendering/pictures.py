@@ -39,7 +39,7 @@ def picture(context: RenderContext, snapshot: Snapshot, frame: float, detail: De
     stopping.check()
     session, request = context.session, context.request(snapshot, frame, detail)
     renderer = context.renderer(request)  # opened again, if the window has closed it meanwhile
-    if (weights := render_job.job.settings.weights) is not None:
+    if (weights := render_job.job.weights) is not None:
         place = weights / f"{round(frame - snapshot.first + 1):04d}.exr"
         _write_weights(place, snapshot, frame, session.run(_weights, renderer, request))
     if renderer.source.by_blender:

@@ -59,24 +59,7 @@ class Where(Enum):
 
 
 @dataclass
-class _RenderSettings:
-    """What a command sets for its render.
-
-    Attributes:
-        device: One of available.CHOICES.
-        weights: Folder for the coefficients of every picture, as EXR files.
-        gpu_memory: Megabytes of the GPU that textures may take; 0: as device.allowed.
-        budget: With the megabytes that it was made for.
-    """
-
-    device: str | None = None
-    weights: Path | None = None
-    gpu_memory: int | None = None
-    budget: tuple[int, Budget] | None = None
-
-
-@dataclass
-class _FilmData:
+class FilmData:
     """What is known of the running job or film, by session_uid of effect scenes.
 
     Attributes:
@@ -108,8 +91,11 @@ class _Job:
         waited_for: Whether the window waits for every picture (Where.WAITED_FOR).
         spent: Names of scenes and cameras of small renders (_cancel).
         said: Sentences that were said once (say_once).
-        settings: Of the running command; empty in the window.
         film_data: What is known of the running job or film.
+        device: One of available.CHOICES, of a command.
+        weights: Folder for the coefficients of every picture, as EXR files, of a command.
+        gpu_memory: Megabytes of the GPU that textures may take, of a command; 0: as device.allowed.
+        budget: With the megabytes that it was made for.
     """
 
     film: int | None = None
@@ -121,8 +107,11 @@ class _Job:
     waited_for: bool = False
     spent: list[tuple[str, str]] = field(default_factory=list)
     said: set[str] = field(default_factory=set)
-    settings: _RenderSettings = field(default_factory=_RenderSettings)
-    film_data: _FilmData = field(default_factory=_FilmData)
+    film_data: FilmData = field(default_factory=FilmData)
+    device: str | None = None
+    weights: Path | None = None
+    gpu_memory: int | None = None
+    budget: tuple[int, Budget] | None = None
 
 
 job = _Job()
