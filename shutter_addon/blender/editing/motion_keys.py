@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_iface as iface_
-from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import PropertyGroup, Scene
 
@@ -35,8 +34,6 @@ _COMPONENTS = (("location", 0), ("location", 1), ("rotation", 0), ("scale", 0))
 CHANNELS = ("location", "rotation", "scale")
 # Influence of a region and of the camera.
 ENDS = "opacity", "influence"
-_LOCKED = n_('{place}: the F-curve of "{channel}" is locked')
-_MUTED = n_('{place}: the F-curve of "{channel}" is muted')
 _COUNTS = {"LOCATION": 2, "ROTATION": 3, "SCALE": 4}
 
 
@@ -183,9 +180,9 @@ def check_curves(effect: PropertyGroup, index: int | None) -> None:
         for curve in fcurves.curves_under(effect.id_data, f"{moving.path_from_id()}.{name}"):
             for part in filter(None, (curve, curve.group)):
                 if part.lock or part.mute:
-                    sentence = _LOCKED if part.lock else _MUTED
+                    sentence = rpt_('{place}: the F-curve of "{channel}" is locked or muted')
                     label = iface_(moving.bl_rna.properties[name].name)
-                    raise EffectError(rpt_(sentence).format(place=validation.place(moving), channel=label))
+                    raise EffectError(sentence.format(place=validation.place(moving), channel=label))
 
 
 def insert(effect: PropertyGroup, index: int | None, names: Sequence[str] = CHANNELS, *, begins: bool = False) -> None:

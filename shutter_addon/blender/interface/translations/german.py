@@ -1035,12 +1035,8 @@ MESSAGES = {
     ): "das aktuelle Bild liegt außerhalb des Verschlussstreifens",
     (
         "*",
-        '{place}: the F-curve of "{channel}" is locked',
-    ): "{place}: die F-Kurve von „{channel}“ ist gesperrt",
-    (
-        "*",
-        '{place}: the F-curve of "{channel}" is muted',
-    ): "{place}: die F-Kurve von „{channel}“ ist stummgeschaltet",
+        '{place}: the F-curve of "{channel}" is locked or muted',
+    ): "{place}: die F-Kurve von „{channel}“ ist gesperrt oder stummgeschaltet",
     ("*", "the shot ends here"): "die Einstellung endet hier",
     (
         "*",
