@@ -65,7 +65,7 @@ def effect_of(scene: Scene, effect_scene: Scene) -> Any:
     return next((effect for effect in scene.virtual_shutter.effects if effect.scene == effect_scene), None)
 
 
-def find_effect(effect_scene: Scene, scene_frame: float | None = None) -> tuple[Scene, PropertyGroup, Strip]:
+def find_effect(effect_scene: Scene, scene_frame: float = 0) -> tuple[Scene, PropertyGroup, Strip]:
     """Return the scene, the effect and an effect strip of an effect scene.
 
     Of the parts of a cut strip, the one counts that shows the frame of the effect scene, else the first.
@@ -76,8 +76,7 @@ def find_effect(effect_scene: Scene, scene_frame: float | None = None) -> tuple[
     for scene in bpy.data.scenes:
         if (effect := effect_of(scene, effect_scene)) is not None:
             parts = [strip for strip in effect_strips(scene) if strip.scene == effect_scene]
-            if scene_frame is not None:
-                parts.sort(key=lambda part: not is_at(part, timeline_frame(part, scene_frame)))
+            parts.sort(key=lambda part: not is_at(part, timeline_frame(part, scene_frame)))
             if parts:
                 return scene, effect, parts[0]
     raise EffectError(rpt_('scene "{scene}" belongs to no Shutter strip').format(scene=effect_scene.name))

@@ -161,8 +161,7 @@ def _draw_bars(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Str
         sentence(layout, str(error), "ERROR")
         return
     is_open = bool(bars.any())
-    words = bar_edits.open_for(scene, effect, strip, effect.active_shutter)
-    words = words or bar_edits.summary(bars, effect.shutters[effect.active_shutter].combine)
+    words = bar_edits.told(scene, effect, strip, bars)
     sentence(layout, words, "NONE" if is_open else "ERROR", is_quiet=is_open)
 
 
