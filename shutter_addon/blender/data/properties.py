@@ -32,7 +32,7 @@ from .consistency import changed
 from .matte_content import choose_strip, strip_name
 
 KEYED = {"ANIMATABLE"}  # Blender's default
-_DISTANCES, _TURN = {"min": -MAX_DISTANCE, "max": MAX_DISTANCE}, math.radians(MAX_DEGREES)
+_FAR, _TURN = {"min": -MAX_DISTANCE, "max": MAX_DISTANCE}, math.radians(MAX_DEGREES)
 
 
 def with_fields(*kinds: type, **more: dict) -> Callable[[type], type]:
@@ -118,9 +118,7 @@ class DrawnPlace(PropertyGroup):
 class _Moving:
     """Where a region or the camera is, and results and settings of tracking it."""
 
-    location: labelled(
-        FloatVectorProperty, "Location", "Movement as a fraction of the picture", size=2, subtype="XYZ", **_DISTANCES
-    )
+    location: labelled(FloatVectorProperty, "Location", "In fractions of the picture", size=2, subtype="XYZ", **_FAR)
     rotation: labelled(FloatProperty, "Rotation", "Rotation about the center", subtype="ANGLE", min=-_TURN, max=_TURN)
     scale: labelled(FloatProperty, "Scale", "Scale about the center", default=1.0, min=-MAX_SCALE, max=MAX_SCALE)
     confidence: FloatProperty(

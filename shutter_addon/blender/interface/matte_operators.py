@@ -55,6 +55,9 @@ def matte_strip(self: Operator, _context: Context, effect: PropertyGroup) -> Non
     matte_content.choose_strip(region, self.strip)
 
 
+_FORMATS = (("PNG", "PNG", "Grey, 16 bits"), ("EXR", "OpenEXR", "Float, in the channel Y"))
+
+
 class SHUTTER_OT_matte_export(OfEffect, ImportHelper, Operator):
     """Write the active matte or outline as pictures, one for each frame of its strip, for other programs"""
 
@@ -64,11 +67,7 @@ class SHUTTER_OT_matte_export(OfEffect, ImportHelper, Operator):
     needs = (needs.a_cover,)
 
     directory: StringProperty(name="Folder", subtype="DIR_PATH", options={"SKIP_SAVE"})
-    format: EnumProperty(
-        name="Format",
-        description="File format of the pictures",
-        items=(("PNG", "PNG", "Grey, 16 bits"), ("EXR", "OpenEXR", "Float, in the channel Y")),
-    )
+    format: EnumProperty(name="Format", description="File format of the pictures", items=_FORMATS)
     filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
 
     def change(self, _context: Context, effect: PropertyGroup) -> None:

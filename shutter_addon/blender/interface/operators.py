@@ -320,7 +320,7 @@ def effect_copy(self: Operator, _context: Context, effect: PropertyGroup) -> Non
     """Copy the shutters, regions, keyframes and options of the effect, for other strips and scenes of this file"""
     undelete.copy(effect, self.effect_strip)
     if data_format.is_newer(self.edit):
-        report(self, rpt_("Copied without data of a newer version of Virtual Shutter"))
+        report(self, rpt_("Data of a newer version of Virtual Shutter is left out"))
 
 
 class SHUTTER_OT_effect_paste(MakesEffect, OfEffect, Operator):
@@ -365,11 +365,9 @@ class SHUTTER_OT_recipe_export(OfEffect, ExportHelper, Operator):
     def change(self, _context: Context, effect: PropertyGroup) -> None:
         path = chosen_file(self)
         recipe_file.save(matte_export.recipe_for(self.edit, effect, self.effect_strip, Path(path)), path)
+        self.report({"INFO"}, rpt_('Saved "{path}"').format(path=path))
         if data_format.is_newer(self.edit):
-            words = rpt_('Saved "{path}" without data of a newer version of Virtual Shutter')
-            report(self, words.format(path=path))
-        else:
-            self.report({"INFO"}, rpt_('Saved "{path}"').format(path=path))
+            report(self, rpt_("Data of a newer version of Virtual Shutter is left out"))
 
 
 class SHUTTER_OT_copy_report(Named, Operator):

@@ -107,10 +107,6 @@ MESSAGES = {
     ): "„{scene}“ wurde von einer neueren Version von Virtual Shutter gespeichert ({version}): Was diese nicht kennt, "
     "bleibt erhalten, wird aber nicht gezeigt, und kein Effekt dieser Datei folgt Streifen, die verschoben, kopiert "
     "oder gelöscht werden",
-    (
-        "*",
-        'Saved "{path}" without data of a newer version of Virtual Shutter',
-    ): "„{path}“ gespeichert, ohne das, was eine neuere Version von Virtual Shutter hinzugefügt hat",
     ("*", "{place}: {property} is none of its choices"): "{place}: {property} ist keine der Möglichkeiten",
     ("*", "{place}: {count} bars, and {window} frames"): "{place}: {count} Balken und {window} Bilder",
     ("*", "An effect can have at most {most} shutters"): "Ein Effekt hat höchstens {most} Verschlüsse",
@@ -521,7 +517,7 @@ MESSAGES = {
     ("*", "Width"): "Breite",
     ("*", "Width of the lines as a fraction of the picture's height"): "Breite der Linien als Bruchteil der Bildhöhe",
     ("*", "Location"): "Position",
-    ("*", "Movement as a fraction of the picture"): "Bewegung als Bruchteil des Bildes",
+    ("*", "In fractions of the picture"): "Als Bruchteil des Bildes",
     ("*", "Rotation"): "Rotation",
     ("*", "Rotation about the center"): "Rotation um die Mitte",
     ("Operator", "Transform Region"): "Region transformieren",
@@ -1207,8 +1203,8 @@ MESSAGES = {
     ): "Verschlüsse, Regionen, Keyframes und Optionen des Effekts für andere Strips und Szenen dieser Datei kopieren",
     (
         "*",
-        "Copied without data of a newer version of Virtual Shutter",
-    ): "Kopiert, ohne das, was eine neuere Version von Virtual Shutter hinzugefügt hat",
+        "Data of a newer version of Virtual Shutter is left out",
+    ): "Es fehlt, was eine neuere Version von Virtual Shutter hinzugefügt hat",
     ("Operator", "Paste Effect"): "Effekt einfügen",
     (
         "*",
