@@ -10,7 +10,7 @@ from ...core.model.effect import STILL_CAMERA, Shutter
 from . import fcurves, strips, validation
 from .annotations import layer_of, layers_of
 from .fcurves import numbers
-from .selection import active_region, active_shutter
+from .selection import active_region, own_regions
 
 
 def changed(group: PropertyGroup, _context: Context) -> None:
@@ -20,8 +20,7 @@ def changed(group: PropertyGroup, _context: Context) -> None:
 
 def choose_region(effect: PropertyGroup) -> None:
     """Make the nearest region of the active shutter active, unless one is: the list shows only those."""
-    shutter = active_shutter(effect)
-    own = [i for i, region in enumerate(effect.regions) if shutter and region.shutter == shutter.name]
+    own = own_regions(effect)
     if own and effect.active_region not in own:
         effect.active_region = min(own, key=lambda i: abs(i - effect.active_region))
 

@@ -141,6 +141,12 @@ def active_shutter(effect: PropertyGroup) -> Any:
     return effect.shutters[effect.active_shutter] if 0 <= effect.active_shutter < len(effect.shutters) else None
 
 
+def own_regions(effect: PropertyGroup) -> list[int]:
+    """Return the indices of the active shutter's regions, which the list shows."""
+    shutter = active_shutter(effect)
+    return [i for i, region in enumerate(effect.regions) if shutter and region.shutter == shutter.name]
+
+
 def active_region(effect: PropertyGroup) -> Any:
     """Return the active region in the list, if it belongs to the active shutter, or None."""
     region = effect.regions[effect.active_region] if 0 <= effect.active_region < len(effect.regions) else None

@@ -304,9 +304,7 @@ def region_remove(_self: Operator, _context: Context, effect: PropertyGroup) -> 
 @operator("Move Region", needs.a_region, direction=_DIRECTION)
 def region_move(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
     """Move the active region in the list (later ones cover earlier ones)"""
-    name = selection.active_shutter(effect).name
-    places = [i for i, region in enumerate(effect.regions) if region.shutter == name]
-    return _move(effect, "region", self.direction, places)
+    return _move(effect, "region", self.direction, selection.own_regions(effect))
 
 
 @operator("Choose Source", icon="SEQUENCE", strip=STRIP)

@@ -1,6 +1,6 @@
 """Parts of panels: sentences, lists, buttons, and the icons of presets and patterns."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cache
 
 import bpy.utils.previews
@@ -43,15 +43,15 @@ def sentence(layout: UILayout, words: str, icon: str = "NONE", room: float = 1.0
         row.label(text=line, icon=icon if i == 0 or icon == "NONE" else "BLANK1", translate=False)
 
 
-def draw_list(layout: UILayout, effect: PropertyGroup, kind: str, items: Sequence[PropertyGroup]) -> None:
+def draw_list(layout: UILayout, effect: PropertyGroup, kind: str, count: int) -> None:
     """Draw the list of shutters or regions with its buttons.
 
     Args:
         kind: "shutter" or "region".
-        items: those that the list shows.
+        count: number of items that the list shows.
     """
     row = layout.row()
-    rows = min(max(len(items), 1), _MOST_ROWS)
+    rows = min(max(count, 1), _MOST_ROWS)
     row.template_list(f"SHUTTER_UL_{kind}s", "", effect, f"{kind}s", effect, f"active_{kind}", rows=rows)
     column = row.column(align=True)
     if kind == "shutter":
@@ -61,7 +61,7 @@ def draw_list(layout: UILayout, effect: PropertyGroup, kind: str, items: Sequenc
     column.operator(f"shutter.{kind}_remove", text="", icon="REMOVE")
     if kind == "shutter":
         column.menu("SHUTTER_MT_shutters", text="", icon="DOWNARROW_HLT")
-    elif len(items) > 1:
+    elif count > 1:
         for direction, icon in (("UP", "TRIA_UP"), ("DOWN", "TRIA_DOWN")):
             column.operator(f"shutter.{kind}_move", text="", icon=icon).direction = direction
 

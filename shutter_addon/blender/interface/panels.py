@@ -65,9 +65,8 @@ class SHUTTER_UL_regions(UIList):
 
     def filter_items(self, _context: Context, effect: PropertyGroup, _property: str) -> tuple[list[int], list[int]]:
         """Show only the regions of the active shutter."""
-        shutter = selection.active_shutter(effect)
-        own = [bool(shutter) and region.shutter == shutter.name for region in effect.regions]
-        return [self.bitflag_filter_item if is_own else 0 for is_own in own], []
+        own = set(selection.own_regions(effect))
+        return [self.bitflag_filter_item if i in own else 0 for i in range(len(effect.regions))], []
 
 
 @menu("presets", "Presets")
@@ -112,7 +111,7 @@ class SEQUENCER_PT_shutter(Panel):
         shown = match_source.shown(effect)
         words = iface_("Source: {strip}").format(strip=shown.source) if shown else iface_("Choose Source")
         layout.operator_menu_enum("shutter.source", "strip", text=words, icon="SEQUENCE", translate=False)
-        draw_list(layout, effect, "shutter", effect.shutters)
+        draw_list(layout, effect, "shutter", len(effect.shutters))
         row = layout.row(align=True)
         draw_operators(row, "draw")
         region = selection.active_region(effect)
@@ -235,9 +234,7 @@ class SHUTTER_PT_notes(Panel):
 
 def _draw_regions(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:
     layout.use_property_split = False
-    shutter = selection.active_shutter(effect)
-    own = [region for region in effect.regions if shutter and region.shutter == shutter.name]
-    draw_list(layout, effect, "region", own)
+    draw_list(layout, effect, "region", len(selection.own_regions(effect)))
     region = selection.active_region(effect)
     if region is not None:
         row = layout.row(align=True)
