@@ -25,7 +25,7 @@ from ...devices.device import Budget, Device, NoDeviceError, Texture, allowed, m
 from ...devices.llvmpipe import is_llvmpipe
 from ...devices.passes import Pass, read_pass
 
-TYPES = {"sampler2DArray": "FLOAT_2D_ARRAY", "usampler2DArray": "UINT_2D_ARRAY"}
+_TYPES = {"sampler2DArray": "FLOAT_2D_ARRAY", "usampler2DArray": "UINT_2D_ARRAY"}
 _AS_IT_IS, _WHOLE, _OPAQUE_BYTES, _PAIRS_OF_BYTES, _SIXTEEN_BITS = range(5)
 # GLSL format: NumPy's type, the format that is sent, how it is unpacked (UNPACK). Only passes use rgba16ui and
 # rgba32ui: floats cannot hold them, and Blender reads whole numbers only of one component.
@@ -245,20 +245,26 @@ def _packed(array: np.ndarray, packing: int) -> np.ndarray:
     return array.astype(np.float32, copy=False)
 
 
-def _compiled(program: Pass) -> gpu.types.GPUShader:
+def shader_info(samplers: Mapping[str, str], constants: Mapping[str, str]) -> gpu.types.GPUShaderCreateInfo:
+    """Return the description of a shader with these samplers and constants, by name with their GLSL types."""
     info = gpu.types.GPUShaderCreateInfo()
+    for slot, (name, kind) in enumerate(samplers.items()):
+        info.sampler(slot, _TYPES[kind], name)
+    for name, kind in constants.items():
+        info.push_constant(kind.upper(), name)
+    return info
+
+
+def _compiled(program: Pass) -> gpu.types.GPUShader:
+    info = shader_info(program.samplers, program.constants)
     for name, value in program.defines.items():
         info.define(name, str(value))
-    for slot, (name, kind) in enumerate(program.samplers.items()):
-        info.sampler(slot, TYPES[kind], name)
     for slot, (name, image) in enumerate(program.images.items()):
         kind = "UINT_2D_ARRAY" if image.format.endswith("ui") else "FLOAT_2D_ARRAY"
         qualifiers = {way for way, used in (("READ", image.reads), ("WRITE", image.writes)) if used}
         info.image(slot, image.format.upper(), kind, name, qualifiers=qualifiers)
     for slot, (name, length) in enumerate(program.blocks.items()):
         info.uniform_buf(slot, "vec4", f"{name}[{length}]")
-    for name, kind in program.constants.items():
-        info.push_constant(kind.upper(), name)
     info.local_group_size(*program.local_size)
     info.compute_source(program.body)
     return gpu.shader.create_from_info(info)

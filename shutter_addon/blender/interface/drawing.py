@@ -207,11 +207,7 @@ def shader_of(name: str) -> GPUShader:
     if name not in Quad.shaders:
         quad, shown = read_pass("show", "QUAD"), read_pass("show", name)
         between = gpu.types.GPUStageInterfaceInfo("show_interface")
-        info = gpu.types.GPUShaderCreateInfo()
-        for constant, kind in (quad.constants | shown.constants).items():
-            info.push_constant(kind.upper(), constant)
-        for slot, (sampler, kind) in enumerate(shown.samplers.items()):
-            info.sampler(slot, blender_gpu.TYPES[kind], sampler)
+        info = blender_gpu.shader_info(shown.samplers, quad.constants | shown.constants)
         for slot, (given, kind) in enumerate(quad.ins.items()):
             info.vertex_in(slot, kind.upper(), given)
         for given, kind in quad.outs.items():
