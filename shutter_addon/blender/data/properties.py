@@ -75,7 +75,7 @@ def _region_renamed(region: PropertyGroup, new: str, old: str, is_set: bool) -> 
     """Return a region's name, cut as in recipes. Blender's own `maxlen` counts bytes instead of characters."""
     new = new[:MAX_NAME]
     if is_set:  # otherwise it has no old name
-        consistency.rename_followed(selection.effect_of_item(region), old, new)
+        consistency.refollow(selection.effect_of_item(region), old, new)
     return new
 
 

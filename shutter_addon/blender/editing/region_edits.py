@@ -19,7 +19,7 @@ from ...core.model.outlines import Curves
 from ...core.model.scribbles import mapped
 from ..data import annotations, fcurves, selection, snapshot, strips
 from ..data.annotations import LAYERS, NOT_THIS, annotation, layer_of, layers_of
-from ..data.consistency import bars, choose_region, color_layers, forget_followed, unique
+from ..data.consistency import bars, choose_region, color_layers, refollow, unique
 from ..data.sampled import Sampling
 from . import motion_keys
 
@@ -120,7 +120,7 @@ def remove_region(effect: PropertyGroup, index: int) -> None:
     remove_layers(effect, effect.regions[index])
     name = effect.regions[index].name
     fcurves.remove_item(effect, "regions", index)
-    forget_followed(effect, name)
+    refollow(effect, name, None)
     effect.active_region = min(effect.active_region, max(len(effect.regions) - 1, 0))
     choose_region(effect)
 
