@@ -16,7 +16,6 @@ from ..media.files import check_name
 from .output import film_output
 from .rendering import render_job, render_settings
 
-BAD_INPUT = 2
 PLACES = ("output", "save", "json", "source", "edit")  # options to name where an OSError names no file
 COMMANDS = "render", "check"
 
@@ -52,7 +51,7 @@ def main(argv: list[str]) -> int:
     return 0
 
 
-def _refuse(reason: str, code: int = BAD_INPUT) -> int:
+def _refuse(reason: str, code: int = render_job.BAD_INPUT) -> int:
     render_job.say(reason)
     return code
 
