@@ -59,7 +59,8 @@ def recipe(path: Path) -> Effect:
     """Read a recipe. Print a warning if older versions showed another picture. RecipeError: it is invalid."""
     found = recipe_file.load(path)
     if found.lost is not None:
-        render_job.say(f"{path}: {found.lost}")  # not translated
+        told = f"{path}: {found.lost}"  # not translated
+        render_job.say(told)
     return found
 
 

@@ -91,8 +91,8 @@ class Named(Mixin):
         except (*FAULTS, UserError) as error:
             return report(self, str(error), "ERROR")
         except OSError as error:  # of an operator with a file browser, for what it writes
-            place = getattr(self, "directory", "") or self.filepath
-            return report(self, sentence(f"{place}: {error.strerror or error}"), "ERROR")
+            words = f"{getattr(self, 'directory', '') or self.filepath}: {error.strerror or error}"
+            return report(self, sentence(words), "ERROR")
 
 
 class OfEffect(Named):

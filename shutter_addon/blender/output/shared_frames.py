@@ -85,7 +85,8 @@ def _resume(scene: Scene, folder: Path, missing: dict[int, Path], key: str, writ
             elif missing:
                 if not waits:
                     awaited = frame_ranges.in_words(list(missing))
-                    render_job.say(f"{folder}: waiting for {awaited}, which other workers have claimed")
+                    words = f"{folder}: waiting for {awaited}, which other workers have claimed"
+                    render_job.say(words)
                 waits = True
                 time.sleep(_PAUSE)
 
