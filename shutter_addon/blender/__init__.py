@@ -11,10 +11,9 @@ from .. import features
 from . import interface
 
 # The classes of each are registered (classes_of), then its `register` is called.
-_DATA = "data.preferences", "data.properties", "data.movie_decoding"
 _GIZMOS = "interface.probe_gizmo", "interface.region_gizmo"  # what is registered before them is grabbed before them
 _INTERFACE = sorted({f"interface.{module.name}" for module in iter_modules(interface.__path__)} - set(_GIZMOS))
-_MODULES = "devices.main_thread", *_DATA, "rendering.engine", *_INTERFACE
+_MODULES = "devices.main_thread", "data.preferences", "data.properties", "rendering.engine", *_INTERFACE
 _modules = [import_module(f".{name}", __package__) for name in _MODULES]
 _modules += [*features.modules(), *(import_module(f".{name}", __package__) for name in (*_GIZMOS, "handlers"))]
 

@@ -16,7 +16,6 @@ from ..media.files import check_name
 from .output import film_output
 from .rendering import render_job, render_settings
 
-BAD_INPUT = 2
 PLACES = ("output", "save", "json", "source", "edit")  # options to name where an OSError names no file
 COMMANDS = "render", "check"
 
@@ -29,8 +28,8 @@ def main(argv: list[str]) -> int:
         for path in vars(arguments).values():
             if isinstance(path, Path):
                 check_name(path)
-        chosen = [getattr(arguments, name, None) for name in ("device", "weights", "gpu_memory")]
-        with render_settings.using(*chosen):
+        names = "device", "weights", "gpu_memory"
+        with render_settings.using(**{name: getattr(arguments, name, None) for name in names}):
             arguments.run(arguments)
     except SystemExit as stop:  # argparse, after --help or a message on stderr
         return int(stop.code or 0)
@@ -52,7 +51,7 @@ def main(argv: list[str]) -> int:
     return 0
 
 
-def _refuse(reason: str, code: int = BAD_INPUT) -> int:
+def _refuse(reason: str, code: int = render_job.BAD_INPUT) -> int:
     render_job.say(reason)
     return code
 

@@ -6,6 +6,7 @@ import inspect
 import sys
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 from types import TracebackType
 
 import bpy
@@ -15,6 +16,7 @@ from bpy.types import Depsgraph, Scene
 from .. import features
 from ..core import recent_errors, revision
 from ..core.messages import sentence
+from ..media import blender_movie
 from .data import data_format, preview_areas, source_media, strips, versions
 from .devices import main_thread
 from .editing import reconcile as reconciling
@@ -60,13 +62,7 @@ def tell(words: str | None) -> None:
     if bpy.app.background:
         render_job.say(words)
     else:  # a file that is being loaded has no windows yet
-        main_thread.soon(partial(_show, sentence(words)))
-
-
-def _show(words: str) -> None:
-    if windows := bpy.context.window_manager.windows:
-        with bpy.context.temp_override(window=windows[0]):
-            operator_bases.popup(bpy.context, words, title="Virtual Shutter", icon="INFO")
+        main_thread.soon(partial(render_job.popup, sentence(words), title="Virtual Shutter", icon="INFO"))
 
 
 def _before_save(*_) -> None:
@@ -105,8 +101,7 @@ def _before_render(scene: Scene, *_) -> None:
     if scene.render.engine == strips.ENGINE and render_job.where() is not Where.JOB:
         invalidation.drop_failed()
     if is_film and scene.render.engine != strips.ENGINE:
-        film = scene.session_uid
-        if not render_job.on_main_thread(partial(_prepare, film, render_job.where() is Where.JOB)):
+        if not render_job.on_main_thread(partial(_prepare, scene.session_uid, render_job.where() is Where.JOB)):
             render_job.fail("Blender's window did not answer, and the effects could not be read")
         edit_feed.begin(scene)
 
@@ -147,9 +142,7 @@ def _after_render(scene: Scene, *_) -> None:
     render_job.end(scene, alone=not render_job.script_waits(inspect.currentframe()))
 
 
-def _uncaught(
-    before: Callable[..., object], kind: type[BaseException], error: BaseException, trace: TracebackType | None
-) -> None:
+def _uncaught(before: Callable, kind: type, error: BaseException, trace: TracebackType | None) -> None:
     """Keep errors of the extension for Copy Report.
 
     Blender prints what operators, panels, handlers and timers raise, which calls sys.excepthook. Nothing else gets all.
@@ -160,6 +153,9 @@ def _uncaught(
     recent_errors.exception(error)
     before(kind, error, trace)
 
+
+# Options of a Blender without user settings and network.
+_ALONE = "--background", "--factory-startup", "--offline-mode", "-noaudio"
 
 HANDLERS = {
     "load_pre": _forget_file,
@@ -179,6 +175,11 @@ HANDLERS = {
 
 
 def register() -> None:
+    script = str(Path(__file__).with_name("data") / "decoding_process.py")  # decodes movies where PyAV is missing
+    if bpy.app.binary_path:
+        blender_movie.lend([bpy.app.binary_path, *_ALONE, "--python", script, "--"])
+    else:  # Blender as a library
+        blender_movie.lend([sys.executable, script])
     for name, function in HANDLERS.items():
         getattr(bpy.app.handlers, name).append(persistent(function))
     sys.excepthook = partial(_uncaught, sys.excepthook)
@@ -187,6 +188,7 @@ def register() -> None:
 
 
 def unregister() -> None:
+    blender_movie.lend(None)
     for name, function in HANDLERS.items():
         getattr(bpy.app.handlers, name).remove(function)
     if isinstance(ours := sys.excepthook, partial) and ours.func is _uncaught:  # not one that was installed later

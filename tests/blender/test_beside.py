@@ -1,6 +1,5 @@
 """What goes on beside Blender, and calls and sentences that wait for a timer of its main thread."""
 
-import contextlib
 from types import SimpleNamespace
 
 import pytest
@@ -131,12 +130,7 @@ def test_a_call_that_fails_is_kept_for_the_report_and_ends_nothing(window, capfd
 def test_a_newer_file_is_told_where_there_is_a_window(window, edit, effect, monkeypatch):
     shown = []
     edit.virtual_shutter.format = data_format.FORMAT + 1
-    handlers.tell(data_format.note([edit]))
-    context = Like(window.context, window_manager=Like(window.context.window_manager, windows=[]))
-    monkeypatch.setattr(handlers, "bpy", Like(window, app=handlers.bpy.app, context=context))
-    assert main_thread.call_waiting() > 0
-    monkeypatch.setattr(handlers.operator_bases, "popup", lambda _context, words, **_looks: shown.append(words))
-    context.temp_override, context.window_manager.windows = lambda **_window: contextlib.nullcontext(), [None]
+    monkeypatch.setattr(handlers.render_job, "popup", lambda words, **_looks: shown.append(words))
     handlers.tell(data_format.note([edit]))
     assert main_thread.call_waiting() > 0
     assert ["newer version" in words for words in shown] == [True]

@@ -142,7 +142,7 @@ def test_a_removed_shutter_takes_its_keys_regions_and_layers_along(three):
 @pytest.mark.parametrize(("index", "to", "order"), [(0, 2, "BCA"), (2, 0, "CAB"), (1, 1, "ABC"), (1, 2, "ACB")])
 def test_a_moved_shutter_keeps_its_keys(three, index, to, order):
     before = shutters_of(three)
-    shutter_edits.move_shutter(three, index, to)
+    region_edits.move(three, "shutter", index, to)
     assert "".join(shutter.name for shutter in three.shutters) == order
     assert shutters_of(three) == before
     assert three.active_shutter == to

@@ -131,13 +131,13 @@ def test_the_trails_length_is_keyed(shown):
     data["shutters"][0]["trail"] = [{"frame": 5, "value": 0.05}, {"frame": 15, "value": 0.3}]
     edit, effect, strip, _found = shown(data, velocity, 10)
     for frame in (10, 12):
-        bars = request(edit, effect, strip, frame).state.bars
+        (bars,) = request(edit, effect, strip, frame).state.bars
         open_for = np.count_nonzero(bars > 1e-9 * bars.sum())
         assert 1 < bars.sum() / bars.max() < WINDOW
         edit.frame_set(frame)
-        assert bar_edits.open_for(edit, effect, strip, 0) == f"Open for {open_for} of {WINDOW} frames here"
+        assert bar_edits.told(edit, effect, strip, bars) == f"Open for {open_for} of {WINDOW} frames here"
     edit.frame_set(COUNT + 1)
-    assert bar_edits.open_for(edit, effect, strip, 0) is None, "nothing is shown there"
+    assert "Open for" not in bar_edits.told(edit, effect, strip, bars), "nothing is shown there"
     effect.shutters[0].length = "FRAMES"
     assert np.array_equal(request(edit, effect, strip, 10).state.bars, np.ones((1, WINDOW)))
 

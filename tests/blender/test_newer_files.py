@@ -85,7 +85,7 @@ def test_a_recipe_of_it_says_what_it_lacks(bpy, newer, tmp_path, capfd):
         out = tmp_path / "recipe.json"
         assert bpy.ops.shutter.recipe_export(filepath=str(out)) == {"FINISHED"}
     assert recipe_file.load(out).options.at(1).window == 6
-    assert f'Warning: Saved "{out}" without data of a newer version' in capfd.readouterr().out
+    assert "Warning: Data of a newer version of Virtual Shutter is left out" in capfd.readouterr().out
 
 
 def test_a_linked_scene_of_it_stops_nothing(bpy, edit, made, capfd):

@@ -224,11 +224,11 @@ def test_tracks_of_a_stretched_timeline(bpy, edit, region):
 @pytest.mark.parametrize(
     ("operator", "channel", "part", "name", "sentence"),
     [
-        ("track", "rotation", "curve", "lock", '"Rotation" is locked'),
-        ("track", "opacity", "curve", "lock", '"Opacity" is locked'),
-        ("track", "rotation", "group", "mute", '"Location" is muted'),
-        ("region_key", "rotation", "group", "lock", '"Location" is locked'),
-        ("region_key", "rotation", "curve", "mute", '"Rotation" is muted'),
+        ("track", "rotation", "curve", "lock", '"Rotation" is locked or muted'),
+        ("track", "opacity", "curve", "lock", '"Opacity" is locked or muted'),
+        ("track", "rotation", "group", "mute", '"Location" is locked or muted'),
+        ("region_key", "rotation", "group", "lock", '"Location" is locked or muted'),
+        ("region_key", "rotation", "curve", "mute", '"Rotation" is locked or muted'),
     ],
 )
 def test_curves_that_take_no_keys_are_said(bpy, edit, region, operator, channel, part, name, sentence):
@@ -286,7 +286,7 @@ def test_what_happens_to_its_region_ends_it_without_another_key(bpy, edit, regio
         region_edits.remove_region(effect, 0)
     elif change == "other":
         region_edits.add_region(effect, effect.shutters[1])
-        region_edits.move_region(effect, 1, 0)
+        region_edits.move(effect, "region", 1, 0)
     elif change == "move":
         effect.start += 3
     elif change == "effects":  # the collection is elsewhere in memory

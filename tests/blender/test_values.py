@@ -129,7 +129,7 @@ IMPOSSIBLE = {
     "source time": (lambda e: use_time(e, NAN), 'effect "Shutter": Source Time is nan'),
     "nan strokes": (lambda e: draw(e.scene.annotation.layers[0], [(0, NAN)]), 'region "Face": a point of its strokes'),
     "transform": (lambda e: setattr(strip_of(e).transform, "offset_x", NAN), '"Shutter": a number of its transform'),
-    "shutters": (lambda e: [e.shutters.add() for _ in range(MAX_SHUTTERS)], f"shutters, but at most {MAX_SHUTTERS}"),
+    "shutters": (lambda e: [e.shutters.add() for _ in range(MAX_SHUTTERS)], f"at most {MAX_SHUTTERS} shutters"),
     "no shutters": (lambda e: e.shutters.clear(), '"Shutter" has no shutter'),
     "points": (lambda e: draw(e.scene.annotation.layers[0], [(0, 0)] * 100_001), "more than 100000 points"),
     "no identity": (

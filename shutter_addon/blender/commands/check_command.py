@@ -3,14 +3,12 @@
 import re
 import sys
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable
 from pathlib import Path
 
 import bpy
 from bpy.types import Scene
 
 from ...core.farm import job_file
-from ...core.messages import UserError
 from ...devices.device import NoDeviceError
 from ..data import external_files, versions
 from ..devices import available
@@ -39,8 +37,8 @@ def run(arguments: Namespace) -> None:
     version = versions.of_edit(scene)
     device, notes, faults = _checked(arguments, scene, frames)
     if arguments.output and not faults:
-        faults += _fault(film_output.make_folder, arguments.output)
-        faults += _fault(job_file.write, arguments.output, version)
+        faults += external_files.raised(film_output.make_folder, arguments.output)
+        faults += external_files.raised(job_file.write, arguments.output, version)
     lines = [
         f"Edit: {arguments.edit}, version {version.key}",
         "Frames: {} to {}, {}×{}".format(frames[0], frames[-1], *film_output.size(scene)),
@@ -69,7 +67,7 @@ def _checked(arguments: Namespace, scene: Scene, frames: range) -> tuple[str, li
     faults += external_files.sound_faults(scene, frames)
     movie = arguments.movie and arguments.movie.parent
     for folder in filter(None, dict.fromkeys((arguments.output, movie, *folders))):
-        faults += _fault(film_output.check_writable, folder)
+        faults += external_files.raised(film_output.check_writable, folder)
     return device, [note for note in (lesser, *notes) if note], faults
 
 
@@ -91,20 +89,11 @@ def _numbers(version: str) -> list[int]:
 def _setting_faults(arguments: Namespace, scene: Scene, frames: range) -> list[str]:
     """Check whether the outputs can be written where they are wanted."""
     read = [arguments.edit, *versions.read_files(scene)]
-    faults = _fault(shared_frames.check_resumable, scene) if arguments.resume else []
+    faults = external_files.raised(shared_frames.check_resumable, scene) if arguments.resume else []
     if arguments.output:
-        faults += _fault(shared_frames.check, arguments.output, arguments.format, frames, read)
+        faults += external_files.raised(shared_frames.check, arguments.output, arguments.format, frames, read)
     if arguments.movie:
-        faults += _fault(film_output.check_movie, arguments.movie, read)
+        faults += external_files.raised(film_output.check_movie, arguments.movie, read)
     is_movie = arguments.movie or scene.render.image_settings.media_type == "VIDEO"
     film = arguments.movie or Path("film.mp4" if is_movie else "frames")
-    return faults or _fault(film_output.check, film, None, film_output.size(scene))
-
-
-def _fault(check: Callable, *arguments) -> list[str]:
-    """Return the message of the error that a check raises, if it does."""
-    try:
-        check(*arguments)
-    except (UserError, OSError) as error:
-        return [film_output.in_words(error, arguments[0])]
-    return []
+    return faults or external_files.raised(film_output.check, film, None, film_output.size(scene))

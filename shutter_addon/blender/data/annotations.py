@@ -62,9 +62,8 @@ def picture_to_region(strip: Strip, size: tuple[int, int], region: Region) -> np
 def image_to_region(region: Region) -> np.ndarray:
     """Return the matrix (3, 3) from the sequencer's image space to pixels of a preview's region."""
     # region_to_view does not round to whole pixels. The last pixel is at the edge of the drawn area.
-    (left, bottom), (right, top) = (
-        region.view2d.region_to_view(x, y) for x, y in ((0, 0), (region.width - 1, region.height - 1))
-    )
+    corners = (0, 0), (region.width - 1, region.height - 1)
+    (left, bottom), (right, top) = (region.view2d.region_to_view(*corner) for corner in corners)
     scale = np.array([region.width, region.height]) / (right - left, top - bottom)
     to_region = np.diag([*scale, 1.0])
     to_region[:2, 2] = -scale * (left, bottom)

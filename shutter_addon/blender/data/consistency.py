@@ -10,7 +10,7 @@ from ...core.model.effect import STILL_CAMERA, Shutter
 from . import fcurves, strips, validation
 from .annotations import layer_of, layers_of
 from .fcurves import numbers
-from .selection import active_region, active_shutter
+from .selection import active_region, own_regions
 
 
 def changed(group: PropertyGroup, _context: Context) -> None:
@@ -20,8 +20,7 @@ def changed(group: PropertyGroup, _context: Context) -> None:
 
 def choose_region(effect: PropertyGroup) -> None:
     """Make the nearest region of the active shutter active, unless one is: the list shows only those."""
-    shutter = active_shutter(effect)
-    own = [i for i, region in enumerate(effect.regions) if shutter and region.shutter == shutter.name]
+    own = own_regions(effect)
     if own and effect.active_region not in own:
         effect.active_region = min(own, key=lambda i: abs(i - effect.active_region))
 
@@ -58,22 +57,15 @@ def rename(effect: PropertyGroup, old: str, new: str) -> str:
     return new
 
 
-def rename_followed(effect: PropertyGroup, old: str, new: str) -> None:
-    """Let shutters follow a region under its new name, unless another region has the old one."""
-    if [region.name for region in effect.regions].count(old) > 1:
+def refollow(effect: PropertyGroup, old: str, new: str | None) -> None:
+    """Let shutters follow a region under its new name, or nothing if it is gone, unless another has the old name."""
+    if [region.name for region in effect.regions].count(old) > (new is not None):
         return
     for shutter in effect.shutters:
         if shutter.follow_region == old != new:
-            shutter.follow_region = new
-
-
-def forget_followed(effect: PropertyGroup, name: str) -> None:
-    """Let shutters follow nothing where the region of this name is gone."""
-    if name in [region.name for region in effect.regions]:
-        return
-    for shutter in effect.shutters:
-        if shutter.follow == "REGION" and shutter.follow_region == name:
-            shutter.follow, shutter.follow_region = "NOTHING", ""
+            shutter.follow_region = new or ""
+            if new is None and shutter.follow == "REGION":
+                shutter.follow = "NOTHING"
 
 
 def bars(shutter: PropertyGroup) -> np.ndarray:

@@ -53,7 +53,7 @@ def key(scene: Scene, effect: PropertyGroup, strip: Strip, frames: range) -> str
         (versions.extension(), versions.colours(), rate, frames, picture_size(effect)),
         _source(effect, source, _contents, start),
         *_settings(effect),
-        *parts(scene, effect, strip, _contents, start),
+        *parts(effect, strip, _contents, start),
     ):
         digest.update(repr(part).encode() + b"\0")
     return digest.hexdigest()[:16]
@@ -64,7 +64,7 @@ def preview_key(scene: Scene, effect: PropertyGroup, strip: Strip) -> int:
     source = strips.nearest_source(scene, effect, strip)
     lies = None if source is None else (source.left_handle, _source(effect, source, _stamps, 0))
     names = tuple(shutter.name for shutter in effect.shutters)
-    return hash((names, lies, *parts(scene, effect, strip, _stamps)))
+    return hash((names, lies, *parts(effect, strip, _stamps)))
 
 
 def is_changed(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
@@ -78,9 +78,7 @@ def is_changed(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
         return True
 
 
-def parts(
-    scene: Scene, effect: PropertyGroup, strip: Strip, files: Files, start: int | None = None
-) -> Iterator[Hashable]:
+def parts(effect: PropertyGroup, strip: Strip, files: Files, start: int | None = None) -> Iterator[Hashable]:
     """Yield what an effect's pictures depend on, except the source and properties with an update callback.
 
     Values of keyed properties do not count, as they change with every frame that plays.
@@ -88,7 +86,7 @@ def parts(
     Args:
         start: Timeline frame that frames count from, so that moved strips give the same. None: they do not.
     """
-    names = [shutter.name for shutter in effect.shutters]
+    scene, names = effect.id_data, [shutter.name for shutter in effect.shutters]
     yield tuple(len(shutter.bars) for shutter in effect.shutters)
     for region in effect.regions:
         yield names.index(region.shutter) if region.shutter in names else None
@@ -146,8 +144,7 @@ def _setting_names(*kinds: type) -> list[str]:
 
 def _curves(owner: Scene, path: str, start: int | None) -> Iterator[Hashable]:
     """Yield what the F-curves say whose path starts with `path`, in the order of their paths."""
-    found = fcurves.curves_under(owner, path)
-    for curve in sorted(found, key=lambda curve: (curve.data_path, curve.array_index)):
+    for curve in sorted(fcurves.curves_under(owner, path), key=lambda curve: (curve.data_path, curve.array_index)):
         yield curve.data_path.removeprefix(path), curve.array_index, curve.mute, curve.extrapolation
         points = curve.keyframe_points
         for name in ("handle_left", "co", "handle_right"):

@@ -8,6 +8,7 @@ import bpy
 from bpy.types import ID, Scene, Strip
 
 from ...core.frames import frame_ranges
+from ...core.messages import UserError, of_file
 from ...media import MediaError, open_source
 from ...media.files import check_file, check_sound
 from ...media.sequence import numbered_alike
@@ -63,7 +64,7 @@ def sound_faults(scene: Scene, frames: range) -> list[str]:
 
 def _of_strips(scene: Scene, frames: range, kinds: tuple[str, ...], *, sources: bool) -> list[str]:
     sentences = []
-    for shown, wanted in requirements.scenes_at(scene, frames):
+    for shown, wanted in requirements.shown_scenes(scene, frames).items():
         others = [] if sources else [each.source.name for each in strips.with_sources(shown)]
         for strip in shown.sequence_editor.strips_all:
             at = frame_ranges.common(requirements.shown_frames(shown, strip), wanted)
@@ -74,11 +75,11 @@ def _of_strips(scene: Scene, frames: range, kinds: tuple[str, ...], *, sources: 
 
 def _of_strip(strip: Strip, frames: range) -> Iterator[str]:
     if strip.type == "MOVIE":
-        yield from _fault(lambda: open_source(absolute(strip, strip.filepath)).close())
+        yield from raised(_open, absolute(strip, strip.filepath))
     elif strip.type == "IMAGE":
         elements = {element.filename for frame in frames if (element := strip.strip_elem_from_frame(frame))}
         folder = absolute(strip, strip.directory)
-        yield from [fault for name in sorted(elements) for fault in _fault(check_file, folder / name)][:1]
+        yield from [fault for name in sorted(elements) for fault in raised(check_file, folder / name)][:1]
     elif strip.type == "MOVIECLIP":
         yield from _of_item(strip.clip) if strip.clip else ["it has no clip"]
     elif strip.type == "SOUND":
@@ -88,11 +89,19 @@ def _of_strip(strip: Strip, frames: range) -> Iterator[str]:
 def _of_item(item: ID, check: Callable = check_file) -> Iterator[str]:
     """Yield faults of a data-block's files; of a sequence, of its first. `check` raises MediaError for a file."""
     for path in named(item):
-        yield from _fault(check, path)
+        yield from raised(check, path)
 
 
-def _fault(function: Callable, *arguments) -> Iterator[str]:
+def raised(check: Callable, *arguments) -> list[str]:
+    """Return the message of the error that a check of `arguments` raises, if it does."""
     try:
-        function(*arguments)
-    except MediaError as error:
-        yield str(error)
+        check(*arguments)
+    except UserError as error:
+        return [str(error)]
+    except OSError as error:
+        return [of_file(error, arguments[0])]
+    return []
+
+
+def _open(path: Path) -> None:
+    open_source(path).close()

@@ -185,9 +185,8 @@ def move_curves(scene, path: str, frames: float) -> None:
 def copy_curves(scene, path: str, new_scene, new_path: str) -> None:
     """Copy the F-curves whose path starts with `path` to the same properties under `new_path`."""
     for curve in curves_under(scene, path):
-        copy = _channelbag(new_scene).fcurves.new_from_fcurve(
-            curve, data_path=new_path + curve.data_path.removeprefix(path)
-        )
+        new = new_path + curve.data_path.removeprefix(path)
+        copy = _channelbag(new_scene).fcurves.new_from_fcurve(curve, data_path=new)
         copy.array_index = curve.array_index
 
 

@@ -111,8 +111,8 @@ def filmed_frames(sampling: Sampling) -> dict[float, int]:
     source = _source(sampling)
     spec, timing = source_media.spec(source), sampling.time or source_media.timing_of(source)
     filmed, fps = (len(spec.files), None) if spec.files else _movie(spec)
-    size = 0, 0  # timing does not depend on it
-    clip = Clip(*size, filmed, fps=fps, timing=timing).stepped(_MOMENTS if sampling.effect.inbetween != "1" else 1)
+    # Timing does not depend on the picture's size.
+    clip = Clip(0, 0, filmed, fps=fps, timing=timing).stepped(_MOMENTS if sampling.effect.inbetween != "1" else 1)
     return {frame: clip.shown(frame).source_frame // clip.step for frame in sampling.frames}
 
 

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -16,8 +16,7 @@ _PLAIN_STRIP = {"blend_alpha": 1.0, "color_saturation": 1.0, "scene_input": "CAM
 _PLAIN_SPACE = {"display_mode": "IMAGE", "display_channel": 0, "show_overexposed": 0}
 
 
-@dataclass(frozen=True)
-class Shown:
+class Shown(NamedTuple):
     """The effect strip that a preview shows.
 
     Attributes:
@@ -32,8 +31,7 @@ class Shown:
     hides_strokes: tuple[bool, ...]
 
 
-@dataclass(frozen=True)
-class Look:
+class Look(NamedTuple):
     """How all previews of a scene show an effect's picture.
 
     Attributes:

@@ -27,10 +27,12 @@ from ...core.model.choices import CONTEXT, FOLLOWED, FOLLOWS, KINDS, MATTE_SOURC
 from ...core.model.fields import Field, fields_of
 from ...core.model.frame_state import Options
 from ...core.model.limits import MAX_BAR, MAX_CHANNEL, MAX_DEGREES, MAX_DISTANCE, MAX_FRAME, MAX_NAME, MAX_SCALE
-from . import consistency, matte_content, selection
+from . import consistency, selection
 from .consistency import changed
+from .matte_content import choose_strip, strip_name
 
 KEYED = {"ANIMATABLE"}  # Blender's default
+_FAR, _TURN = {"min": -MAX_DISTANCE, "max": MAX_DISTANCE}, math.radians(MAX_DEGREES)
 
 
 def with_fields(*kinds: type, **more: dict) -> Callable[[type], type]:
@@ -73,7 +75,7 @@ def _region_renamed(region: PropertyGroup, new: str, old: str, is_set: bool) -> 
     """Return a region's name, cut as in recipes. Blender's own `maxlen` counts bytes instead of characters."""
     new = new[:MAX_NAME]
     if is_set:  # otherwise it has no old name
-        consistency.rename_followed(selection.effect_of_item(region), old, new)
+        consistency.refollow(selection.effect_of_item(region), old, new)
     return new
 
 
@@ -85,6 +87,11 @@ def labelled(kind: Callable, name: str, description: str, **more: Any) -> object
 def choice(name: str, description: str, items: Sequence[tuple[str, str, str]], **more: Any) -> object:
     """Return an enum property without keys, which by default changes pictures."""
     return labelled(EnumProperty, name, description, items=items, options=set(), **more)
+
+
+def setting(kind: Callable, name: str, description: str, **more: Any) -> object:
+    """Return a property without keys that changes no picture, with our own translation."""
+    return kind(name=name, description=description, options=set(), translation_context=CONTEXT, **more)
 
 
 class TrackStop(PropertyGroup):
@@ -108,64 +115,28 @@ class DrawnPlace(PropertyGroup):
     scale: FloatProperty(default=1.0)
 
 
-class _Tracked:
-    """Results and settings of tracking a region or the camera."""
+class _Moving:
+    """Where a region or the camera is, and results and settings of tracking it."""
 
+    location: labelled(FloatVectorProperty, "Location", "In fractions of the picture", size=2, subtype="XYZ", **_FAR)
+    rotation: labelled(FloatProperty, "Rotation", "Rotation about the center", subtype="ANGLE", min=-_TURN, max=_TURN)
+    scale: labelled(FloatProperty, "Scale", "Scale about the center", default=1.0, min=-MAX_SCALE, max=MAX_SCALE)
     confidence: FloatProperty(
-        name="Confidence",
-        description="How certain the tracked position is",
-        subtype="PERCENTAGE",
-        default=100.0,
-        min=0.0,
-        max=100.0,
+        name="Confidence", description="How certain the position is", subtype="PERCENTAGE", default=100, min=0, max=100
     )
     stops: CollectionProperty(type=TrackStop)
-    motion: EnumProperty(
-        name="Motion",
-        description="Which channels Track and Follow key",
-        items=MOTIONS,
-        options=set(),
-        default="SCALE",
-        translation_context=CONTEXT,
+    motion: setting(EnumProperty, "Motion", "Which channels Track and Follow key", items=MOTIONS, default="SCALE")
+    track_until: setting(IntProperty, "Until", "Timeline frame at which tracking stops; 0 is the end of the strip")
+    track_all_keys: setting(BoolProperty, "All Keys", "Key every tracked frame, not only where the motion needs it")
+    track_ends: setting(
+        BoolProperty, "Fade Out When Lost", "Fade a region or the camera out where the track ends", default=True
     )
-    track_until: IntProperty(
-        name="Until",
-        description="Timeline frame at which tracking stops; 0 is the end of the strip",
-        options=set(),
-        translation_context=CONTEXT,
-    )
-    track_all_keys: BoolProperty(
-        name="All Keys",
-        description="Keep a key at every tracked frame, in place of those that the motion needs within a pixel",
-        options=set(),
-    )
-    track_ends: BoolProperty(
-        name="Fade Out When Lost",
-        description="Track keys a region's opacity, or the camera's influence, so that it fades where the track ends; "
-        "a region ends with its shot",
-        default=True,
-        options=set(),
-    )
-
-
-def location_property(description: str) -> object:
-    limits = {"min": -MAX_DISTANCE, "max": MAX_DISTANCE}
-    return labelled(FloatVectorProperty, "Location", description, subtype="XYZ", size=2, **limits)
-
-
-def rotation_property(description: str) -> object:
-    limit = math.radians(MAX_DEGREES)
-    return labelled(FloatProperty, "Rotation", description, subtype="ANGLE", min=-limit, max=limit)
-
-
-def scale_property(description: str) -> object:
-    return labelled(FloatProperty, "Scale", description, default=1.0, min=-MAX_SCALE, max=MAX_SCALE)
 
 
 @with_fields(
     model.Region, model.OutlineRegion, model.FileContent, model.RampContent, name={"set_transform": _region_renamed}
 )
-class ShutterRegion(_Tracked, PropertyGroup):
+class ShutterRegion(_Moving, PropertyGroup):
     shutter: labelled(StringProperty, "Shutter", "Name of the shutter that holds in the region")
     layer: labelled(StringProperty, "Layer", "Annotation layer that holds the strokes")
     not_layer: labelled(StringProperty, "Not This", "Annotation layer of strokes on what the subject is not")
@@ -179,35 +150,19 @@ class ShutterRegion(_Tracked, PropertyGroup):
     image: labelled(PointerProperty, "File", "Movie, image sequence or picture that is the matte", type=bpy.types.Image)
     strip: labelled(StringProperty, "Strip", "Identity of the strip that is the matte")
     strip_name: StringProperty(
-        name="Strip",
-        description="Strip that is the matte",
-        get=matte_content.strip_name,
-        set=matte_content.choose_strip,
-        options={"SKIP_SAVE"},
+        name="Strip", description="Strip that is the matte", get=strip_name, set=choose_strip, options={"SKIP_SAVE"}
     )
     mask: labelled(PointerProperty, "Mask", "Mask that is the matte", type=bpy.types.Mask)
     channel_name: labelled(StringProperty, "Channel Name", "Name of the channel in the EXR file", maxlen=MAX_CHANNEL)
-    location: location_property("Distance from where the region was drawn, as a fraction of the picture")
-    rotation: rotation_property("Rotation about the region's center")
-    scale: scale_property("Scale about the region's center")
-    follow_clip: PointerProperty(
-        name="Clip",
-        description="Movie clip of the source's footage, in which something is tracked",
-        type=bpy.types.MovieClip,
-    )
+    follow_clip: PointerProperty(name="Clip", description="Movie clip that has the track", type=bpy.types.MovieClip)
     follow_kind: choice("Follow Track", "What the region follows", FOLLOWED, update=None, default="TRACK")
-    follow_object: StringProperty(
-        name="Object", description="Tracking object that has the tracks; without one, the camera"
-    )
+    follow_object: StringProperty(name="Object", description="Tracking object that has the tracks; empty: the camera")
     follow_track: StringProperty(name="Track", description="Name of the track or plane track that is followed")
 
 
 @with_fields(model.Camera)
-class ShutterCamera(_Tracked, PropertyGroup):
+class ShutterCamera(_Moving, PropertyGroup):
     name: StringProperty(name="Name", description="Name of the camera's animation channels", default="Camera")
-    location: location_property("Movement of what the camera sees, as a fraction of the picture")
-    rotation: rotation_property("Rotation of what the camera sees, about the picture's center")
-    scale: scale_property("Scale of what the camera sees, about the picture's center")
 
 
 def _shutter_renamed(shutter: PropertyGroup, new: str, old: str, _is_set: bool) -> str:
@@ -235,9 +190,7 @@ def _region_selected(effect: PropertyGroup, _context: Context) -> None:
 
 
 class ShutterBar(PropertyGroup):
-    weight: labelled(
-        FloatProperty, "Weight", "Contribution of the bar's frame", default=1.0, min=0.0, max=MAX_BAR, soft_max=1.0
-    )
+    weight: labelled(FloatProperty, "Weight", "Contribution of its frame", default=1, min=0, max=MAX_BAR, soft_max=1)
 
 
 @with_fields(model.Shutter, name={"set_transform": _shutter_renamed}, color={"update": _shutter_recolored})
@@ -261,12 +214,7 @@ class _Settings:
     source: StringProperty(name="Source", description="Identity of the source strip")
     start: FloatProperty(name="Start", description="Timeline frame where the effect's content starts", options=set())
     camera: PointerProperty(name="Camera", description="Motion of what the camera sees", type=ShutterCamera)
-    use_source_time: labelled(
-        BoolProperty,
-        "Custom Time",
-        "Show the source at the time that is set here, in place of the strip's own timing",
-        options=set(),
-    )
+    use_source_time: labelled(BoolProperty, "Custom Time", "Show the source at the time set here", options=set())
     source_time: labelled(
         FloatProperty,
         "Source Time",

@@ -13,6 +13,7 @@ from ...core.model import effect as model
 from ...core.model import keyframes
 from ...core.model.choices import CHANNELS
 from ...core.model.fields import fields_of
+from ...core.model.keyframes import Channel
 from ...core.model.scribbles import mapped
 from ...core.recipes import recipe
 from ...media.files import check_name
@@ -37,49 +38,47 @@ def apply(scene, effect, strip, source: model.Effect, folder: Path = Path()) -> 
     images = {file: matte_image(folder / file.path, file.channel) for file in recipe.contents(source)}
     clear(scene, effect)
     path, options = effect.path_from_id(), source.options.at(1)
-    _set_fields(scene, effect, path, options, first)
-    _set_fields(scene, effect, path, source, first, group=effect.name)
+    _set_fields(effect, path, options, first)
+    _set_fields(effect, path, source, first, group=effect.name)
     effect.use_source_time = source.time is not None
     if isinstance(source.time, keyframes.SourceTime):
-        _set_channel(scene, effect, path, "source_time", source.time.numbers, first, group=effect.name)
-    _set_fields(scene, effect.camera, f"{path}.camera", source.camera, first, group=effect.camera.name)
-    _set_moves(scene, effect.camera, f"{path}.camera", source.camera.moves, first, group=effect.camera.name)
+        _set_channel(effect, path, "source_time", source.time.numbers, first, group=effect.name)
+    _set_fields(effect.camera, f"{path}.camera", source.camera, first, group=effect.camera.name)
+    _set_moves(effect.camera, f"{path}.camera", source.camera.moves, first, group=effect.camera.name)
     for i, shutter in enumerate(source.shutters):
-        _add_shutter(scene, effect, f"{path}.shutters[{i}]", shutter, first)
+        _add_shutter(effect, f"{path}.shutters[{i}]", shutter, first)
     for i, region in enumerate(source.regions):
         # Pass the path: path_from_id is slow among many items.
-        _add_region(scene, effect, strip, f"{path}.regions[{i}]", region, source.shutters[region.shutter], first)
+        _add_region(effect, strip, f"{path}.regions[{i}]", region, source.shutters[region.shutter], first)
         if isinstance(region, model.MatteRegion) and isinstance(region.content, model.FileContent):
             _set_file(effect.regions[-1], strip, region.content, images[region.content])
 
 
-def _set_fields(scene, owner, path: str, part: Any, first: float, **curve) -> None:
+def _set_fields(owner, path: str, part: Any, first: float, **curve) -> None:
     """Set the fields of a part of an effect, and their keys."""
     for name, each in fields_of(type(part)).items():
         value = getattr(part, name)
         if each.is_channel:
-            _set_channel(scene, owner, path, each.blender, value, first, **curve)
+            _set_channel(owner, path, each.blender, value, first, **curve)
         else:
             setattr(owner, each.blender, str(value).upper() if each.choices else value)
 
 
-def _set_channel(
-    scene, owner, path: str, name: str, channel: keyframes.Channel, first: float, change: Callable = float, **curve
-) -> None:
+def _set_channel(owner, path: str, name: str, source: Channel, first: float, change: Callable = float, **curve) -> None:
     """Set a number or a vector of a property group, or its keys. `change` converts values to Blender's."""
-    if not isinstance(channel, keyframes.Keys):
-        setattr(owner, name, change(channel.at(1)))
+    if not isinstance(source, keyframes.Keys):
+        setattr(owner, name, change(source.at(1)))
         return
-    values = [change(value) for value in channel.values]
+    values = [change(value) for value in source.values]
     setattr(owner, name, values[0])
     for index, numbers in enumerate(np.reshape(values, (len(values), -1)).T.tolist()):
-        _set_keys(scene, f"{path}.{name}", index, channel, numbers, first, **curve)
+        _set_keys(owner, f"{path}.{name}", index, source, numbers, first, **curve)
 
 
-def _set_keys(scene, path: str, index: int, keys: keyframes.Keys, values: Iterable[float], first: float, **curve):
+def _set_keys(owner, path: str, index: int, keys: keyframes.Keys, values: Iterable[float], first: float, **curve):
     """Make an F-curve with these values at the frames of keys."""
     frames = (frame + first for frame in keys.frames)
-    fcurves.set_keys(scene, path, index, list(zip(frames, values, keys.eases, strict=True)), **curve)
+    fcurves.set_keys(owner.id_data, path, index, list(zip(frames, values, keys.eases, strict=True)), **curve)
 
 
 def matte_image(path: str | Path, channel: str = "luminance"):
@@ -118,9 +117,9 @@ def clear(scene, effect) -> None:
             effect.scene.annotation.layers.remove(layer)
 
 
-def _add_shutter(scene, effect, path: str, source: model.Shutter, first: float) -> None:
+def _add_shutter(effect, path: str, source: model.Shutter, first: float) -> None:
     shutter = effect.shutters.add()
-    _set_fields(scene, shutter, path, source, first)
+    _set_fields(shutter, path, source, first)
     if isinstance(source.follow, model.AnyRegion):
         shutter.follow, shutter.follow_region = "REGION", source.follow.name
     elif source.follow is not None:
@@ -130,20 +129,18 @@ def _add_shutter(scene, effect, path: str, source: model.Shutter, first: float) 
     for k, weight in enumerate(bars[0]):
         shutter.bars.add().weight = weight
         if isinstance(keys, keyframes.Keys):
-            _set_keys(scene, f"{path}.bars[{k}].weight", 0, keys, (each[k] for each in bars), first)
+            _set_keys(shutter, f"{path}.bars[{k}].weight", 0, keys, (each[k] for each in bars), first)
 
 
-def _add_region(
-    scene, effect, strip, path: str, source: model.Region | model.MatteRegion, shutter: model.Shutter, first: float
-) -> None:
+def _add_region(effect, strip, path: str, source: model.AnyRegion, shutter: model.Shutter, first: float) -> None:
     region = effect.regions.add()
     region.shutter = shutter.name
     region.kind = source.kind.upper() if isinstance(source, model.Region) else _KINDS[type(source)]
     content = getattr(source, "content", None)
     if isinstance(content, model.RampContent):
         region.kind = "RAMP"
-        _set_fields(scene, region, path, content, first)
-    _set_fields(scene, region, path, source, first)
+        _set_fields(region, path, content, first)
+    _set_fields(region, path, source, first)
     if isinstance(source, model.SubjectRegion):
         for layer, drawings in zip(LAYERS, (source.drawings, source.nots, source.outlines), strict=True):
             color = NOT_THIS if layer == "not_layer" else shutter.color
@@ -151,7 +148,7 @@ def _add_region(
                 setattr(region, layer, _draw(effect, strip, source, drawings, color, first))
     elif source.drawings:
         region.layer = _draw(effect, strip, source, source.drawings, shutter.color, first)
-    _set_moves(scene, region, path, source.moves, first)
+    _set_moves(region, path, source.moves, first)
 
 
 def _set_file(region, strip, content: model.FileContent, image) -> None:
@@ -165,21 +162,19 @@ def _set_file(region, strip, content: model.FileContent, image) -> None:
     region.channel_name = content.channel if is_named else ""
 
 
-def _set_moves(scene, moving, path: str, moves: model.Moves, first: float, **curve) -> None:
+def _set_moves(moving, path: str, moves: model.Moves, first: float, **curve) -> None:
     """Set location, rotation and scale of a region or the camera, and their keys."""
     for name, change in (("location", tuple), ("rotation", np.radians), ("scale", float)):
-        _set_channel(scene, moving, path, name, getattr(moves, name), first, change, **curve)
+        _set_channel(moving, path, name, getattr(moves, name), first, change, **curve)
 
 
-def _draw(
-    effect, strip, source: model.AnyRegion, drawings: model.Drawings, color: Sequence[float], first: float
-) -> str:
+def _draw(effect, strip, source: model.AnyRegion, drawn: model.Drawings, color: Sequence[float], first: float) -> str:
     """Draw a region's strokes on a new annotation layer, with a frame for each drawing. Return the layer's name."""
     layer = annotation(effect).layers.new(source.name or data_("Region"), set_active=False)
     layer.color = color
     to_image = picture_to_image(strip, picture_size(effect))
     is_keyed = isinstance(source.moves.location, keyframes.Keys) or isinstance(source, model.SubjectRegion)
-    for frame, strokes in zip(drawings.frames, drawings.strokes, strict=True):
+    for frame, strokes in zip(drawn.frames, drawn.strokes, strict=True):
         drawing = layer.frames.new(int((frame if is_keyed else 1) + first))
         for points in strokes:
             add_stroke(drawing, mapped(to_image, points))

@@ -49,18 +49,23 @@ def camera(strip: Strip) -> Object | None:
     return strip.scene_camera or strip.scene.camera or next(bound, None)
 
 
-def scenes_at(film: Scene, frames: range) -> list[tuple[Scene, range]]:
-    """Return what a film shows at some frames: itself, and every scene in its Scene strips at all frames."""
-    shown = {film: frames}
+def shown_scenes(film: Scene, frames: range | None = None) -> dict[Scene, range]:
+    """Return what a film shows at some frames: itself, and every scene in its Scene strips at all frames.
+
+    Args:
+        frames: None: at any, even where strips are muted now.
+    """
+    ever = range(-MAX_FRAME, MAX_FRAME + 1)
+    shown = {film: ever if frames is None else frames}
     new = [film]
     while new:
         scene = new.pop()
         for strip in all_strips(scene):
             is_new = strip.type == "SCENE" and strip.scene and strip.scene not in shown
-            if is_new and is_shown(scene, strip, shown[scene]):
-                shown[strip.scene] = range(-MAX_FRAME, MAX_FRAME + 1)
+            if is_new and (frames is None or is_shown(scene, strip, shown[scene])):
+                shown[strip.scene] = ever
                 new.append(strip.scene)
-    return [(scene, at) for scene, at in shown.items() if scene.sequence_editor]
+    return {scene: at for scene, at in shown.items() if scene.sequence_editor}
 
 
 def is_shown(scene: Scene, strip: Strip, frames: range) -> bool:
@@ -85,18 +90,18 @@ def used_data(scene: Scene, frames: range) -> set[ID]:
 
     What scenes hold beside their strips is in no picture.
     """
-    shown = scenes_at(scene, frames)
+    shown = shown_scenes(scene, frames)
     uses: dict = {}
     for item, users in bpy.data.user_map().items():
         for user in users:
             uses.setdefault(user, []).append(item)
     items = set()
-    new = [item for each, at in shown for item in _named(each, at)]
+    new = [item for each, at in shown.items() for item in _named(each, at)]
     while new:
         if (item := new.pop()) not in items:
             items.add(item)
             new += uses.get(item, ())
-    return items.union(each for each, _ in shown)
+    return items.union(shown)
 
 
 def _named(scene: Scene, frames: range) -> Iterator[ID]:

@@ -15,6 +15,7 @@ from ...core.messages import UserError
 from ...core.model import effect as model
 from ...core.model import keyframes
 from ...core.model.fields import Field, fields_of
+from ...core.model.keyframes import Channel
 from ...core.model.motions import Placement
 from . import annotations, strips, validation
 from .fcurves import Curves
@@ -81,7 +82,7 @@ class Sampling:
         """The effect's path from its scene."""
         return self.effect.path_from_id()
 
-    def over(self, keyed: object, at: Callable[[float], object], keys: tuple = ()) -> keyframes.Channel:
+    def over(self, keyed: object, at: Callable[[float], object], keys: tuple = ()) -> Channel:
         """Return a channel of a function's values: sampled where it is keyed, else constant.
 
         Args:
@@ -92,14 +93,10 @@ class Sampling:
             return keyframes.Constant(tried(at, 0.0))
         return keyframes.Samples({frame: tried(at, frame) for frame in self.frames}, keys)
 
-    def channel(
-        self, owner: PropertyGroup, path: str, name: str, change: Callable = lambda value: value
-    ) -> keyframes.Channel:
+    def channel(self, owner: PropertyGroup, path: str, name: str, change: Callable = lambda value: value) -> Channel:
         """Return the channel of a float property or vector, with a function applied to each value."""
-        keyed = self.curves.of(owner, path, name)
-        return self.over(
-            keyed, lambda frame: change(self.curves.value(owner, path, name, frame)), self.curves.keys(keyed)
-        )
+        curves, keyed = self.curves, self.curves.of(owner, path, name)
+        return self.over(keyed, lambda frame: change(curves.value(owner, path, name, frame)), curves.keys(keyed))
 
     def fields(self, owner: PropertyGroup, path: str, kind: type, unused: Collection[str] = ()) -> dict:
         """Return values and channels for the fields of a model's class, by field name.
@@ -126,7 +123,7 @@ class Sampling:
         )
 
     @cached_property
-    def placement(self) -> keyframes.Channel:
+    def placement(self) -> Channel:
         """The matrix from the sequencer's image to the strip's picture, which may be keyed."""
         strip = self.strip
         if strip is None:
@@ -141,7 +138,7 @@ class Sampling:
         return self.over(keyed, at)
 
     @cached_property
-    def time(self) -> keyframes.Channel | None:
+    def time(self) -> Channel | None:
         """The source time that the effect sets; None: the strip's own timing counts."""
         effect = self.effect
         if not effect.use_source_time:

@@ -75,14 +75,8 @@ def visible(scene: Scene) -> list:
     if not editor:
         return []
     level = editor.meta_stack[-1] if editor.meta_stack else editor
-    return [
-        strip
-        for strip in level.strips
-        if strips.is_at(strip, frame)
-        and strip.type != "SOUND"
-        and not strip.mute
-        and not level.channels[strip.channel].mute
-    ]
+    here = [strip for strip in level.strips if strips.is_at(strip, frame) and strip.type != "SOUND"]
+    return [strip for strip in here if not (strip.mute or level.channels[strip.channel].mute)]
 
 
 def why_unseen(scene: Scene, strip: Strip) -> str:
@@ -145,6 +139,12 @@ def moving(effect: PropertyGroup, index: int | None) -> PropertyGroup:
 def active_shutter(effect: PropertyGroup) -> Any:
     """Return the active shutter in the list, or None."""
     return effect.shutters[effect.active_shutter] if 0 <= effect.active_shutter < len(effect.shutters) else None
+
+
+def own_regions(effect: PropertyGroup) -> list[int]:
+    """Return the indices of the active shutter's regions, which the list shows."""
+    shutter = active_shutter(effect)
+    return [i for i, region in enumerate(effect.regions) if shutter and region.shutter == shutter.name]
 
 
 def active_region(effect: PropertyGroup) -> Any:

@@ -211,12 +211,8 @@ def check_counts(effect: PropertyGroup) -> None:
     """Raise EffectError where an effect has no shutter, or too many shutters or regions."""
     if not effect.shutters:
         raise EffectError(rpt_('"{effect}" has no shutter').format(effect=effect.name))
-    for sentence, items, most in (
-        (rpt_("{place}: {count} shutters, but at most {most} are possible"), effect.shutters, limits.MAX_SHUTTERS),
-        (rpt_("{place}: {count} regions, but at most {most} are possible"), effect.regions, limits.MAX_REGIONS),
-    ):
-        if len(items) > most:
-            raise EffectError(sentence.format(place=validation.place(effect), count=len(items), most=most))
+    if full := validation.why_full(effect):
+        raise EffectError(full)
 
 
 def _options(sampling: Sampling) -> keyframes.Channel:
@@ -254,21 +250,19 @@ def _bars(sampling: Sampling, path: str, shutter: PropertyGroup, options: keyfra
             sentence = rpt_("{place}: {count} bars, and {window} frames")
             raise EffectError(sentence.format(place=validation.place(shutter), count=len(stored), window=window))
     if not keyed:
-        return keyframes.Bars(keyframes.Constant(_bars_over(shutter, stored, keyed, [0.0])[0.0]))
+        return keyframes.Bars(keyframes.Constant(_bars_over(shutter, keyed, [0.0])[0.0]))
     keys = curves.keys(list(keyed.values()))
     ways = _ways(list(keyed.values()), [frame for frame, _ease in keys], frames) if keys else {}
     needed = {*frames, *(end for ends, _share in ways.values() for end in ends)}
-    values = keyframes.Samples(_bars_over(shutter, stored, keyed, sorted(needed)))
+    values = keyframes.Samples(_bars_over(shutter, keyed, sorted(needed)))
     if not keys:  # curves of samples or of modifiers alone
         return keyframes.Bars(values)
     return keyframes.Bars(values, keys, keyframes.Samples({frame: share for frame, (_ends, share) in ways.items()}))
 
 
-def _bars_over(
-    shutter: PropertyGroup, stored: list[float], keyed: dict[int, FCurve], frames: list[float]
-) -> dict[float, np.ndarray | UserError]:
+def _bars_over(shutter: PropertyGroup, keyed: dict[int, FCurve], frames: Frames) -> dict[float, np.ndarray | UserError]:
     """Return the bars (L,) at each frame. `keyed` has the F-curves by index of the bar."""
-    rows = np.tile(np.array(stored), (len(frames), 1))
+    rows = np.tile(np.array([bar.weight for bar in shutter.bars]), (len(frames), 1))
     for i, curve in keyed.items():
         # A curve may go below 0, a bar may not. NaN stays NaN, and is refused below.
         rows[:, i] = np.clip([curve.evaluate(frame) for frame in frames], 0.0, limits.MAX_BAR)
@@ -386,8 +380,7 @@ def recipe_of(scene: Scene, effect: PropertyGroup, strip: Strip, contents: Seque
     if effect.regions and image_to_picture(strip, picture_size(effect)) is None:
         raise EffectError(rpt_('strip "{strip}" is too small to find its scribbles').format(strip=strip.name))
     with translated(rpt_):
-        plain = read(scene, effect, strip, sorted({*shown, *keyed}))
-        return key_fitting.with_keys(plain, shown, contents)
+        return key_fitting.with_keys(read(scene, effect, strip, sorted({*shown, *keyed})), shown, contents)
 
 
 def _keyed(scene: Scene, effect: PropertyGroup) -> set[float]:

@@ -58,11 +58,8 @@ def strip_at(scene: Scene, frame: int, but: str | None = None) -> tuple[Strip, b
     editor = scene.sequence_editor
     if has_animation(scene, ".mute"):
         return None  # strips may be muted at other frames
-    seen = [
-        strip
-        for strip in editor.strips
-        if strip.type != "SOUND" and strip.name != but and frame in requirements.shown_frames(scene, strip)
-    ]
+    others = [strip for strip in editor.strips if strip.type != "SOUND" and strip.name != but]
+    seen = [strip for strip in others if frame in requirements.shown_frames(scene, strip)]
     top = max(seen, key=lambda strip: strip.channel, default=None)
     if top is None or top not in strips.effect_strips(scene) or not covers_all(scene, top):
         return None

@@ -138,9 +138,8 @@ def _spec(strip: Strip, key: tuple) -> SourceSpec:
         "alpha": None if strip.type == "MOVIECLIP" else alpha,
         "deinterlace": strip.type == "MOVIE" and strip.use_deinterlace,
     }
-    return SourceSpec(
-        key=key, path=path(0), files=None if is_movie(strip) else tuple(path(i) for i in range(count)), options=options
-    )
+    files = None if is_movie(strip) else tuple(map(path, range(count)))
+    return SourceSpec(key=key, path=path(0), files=files, options=options)
 
 
 def open_media(strip: Strip) -> FrameSource:
@@ -155,7 +154,7 @@ def files(strip: Strip) -> list[Path]:
         MediaError: It has none.
     """
     count, path = _clip_files(strip) if strip.type == "MOVIECLIP" else _files(strip)
-    return [path(index) for index in range(count)]
+    return list(map(path, range(count)))
 
 
 def first_frame(strip: Strip) -> int:

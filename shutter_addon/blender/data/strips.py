@@ -48,17 +48,6 @@ def local_scenes() -> list:
     return [scene for scene in bpy.data.scenes if scene.library is None]
 
 
-def shown_scenes(scene: Scene) -> list:
-    """Return the scene, and those that its Scene strips show."""
-    shown, new = [], [scene]
-    while new:
-        other = new.pop()
-        if other is not None and other not in shown and other.sequence_editor:
-            shown.append(other)
-            new += [strip.scene for strip in other.sequence_editor.strips_all if strip.type == "SCENE"]
-    return shown
-
-
 def own_strips(scene: Scene) -> list[Strip]:
     """Return the strips that were made for effects, even if their scene has another engine or was deleted."""
     return [strip for strip in all_strips(scene) if strip.type == "SCENE" and _is_own(strip)]
@@ -76,7 +65,7 @@ def effect_of(scene: Scene, effect_scene: Scene) -> Any:
     return next((effect for effect in scene.virtual_shutter.effects if effect.scene == effect_scene), None)
 
 
-def find_effect(effect_scene: Scene, scene_frame: float | None = None) -> tuple[Scene, PropertyGroup, Strip]:
+def find_effect(effect_scene: Scene, scene_frame: float = 0) -> tuple[Scene, PropertyGroup, Strip]:
     """Return the scene, the effect and an effect strip of an effect scene.
 
     Of the parts of a cut strip, the one counts that shows the frame of the effect scene, else the first.
@@ -87,8 +76,7 @@ def find_effect(effect_scene: Scene, scene_frame: float | None = None) -> tuple[
     for scene in bpy.data.scenes:
         if (effect := effect_of(scene, effect_scene)) is not None:
             parts = [strip for strip in effect_strips(scene) if strip.scene == effect_scene]
-            if scene_frame is not None:
-                parts.sort(key=lambda part: not is_at(part, timeline_frame(part, scene_frame)))
+            parts.sort(key=lambda part: not is_at(part, timeline_frame(part, scene_frame)))
             if parts:
                 return scene, effect, parts[0]
     raise EffectError(rpt_('scene "{scene}" belongs to no Shutter strip').format(scene=effect_scene.name))
@@ -165,10 +153,8 @@ def nearest_source(scene: Scene, effect: PropertyGroup, strip: Strip) -> Any:
         channels = other.channel - strip.channel
         return apart, elsewhere, other not in connected, channels > 0, abs(channels)
 
-    candidates = [
-        other for other in identified(scene, "virtual_shutter_source", effect.source) if other.type in SOURCES
-    ]
-    return min(candidates, key=distance, default=None)
+    found = [other for other in identified(scene, "virtual_shutter_source", effect.source) if other.type in SOURCES]
+    return min(found, key=distance, default=None)
 
 
 def identified(scene: Scene, name: str, identity: str) -> list:

@@ -16,6 +16,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import Property, PropertyGroup
 
 from ...core.messages import EffectError
+from ...core.model import limits
 
 _PLACES = {
     "": n_('effect "{name}"'),
@@ -88,3 +89,12 @@ def word(group: PropertyGroup, name: str, value: float | None = None) -> Any:
 
 def _called(prop: Property) -> str:
     return iface_(prop.name, prop.translation_context)
+
+
+def why_full(effect: PropertyGroup, *, regions: int = 0, shutters: int = 0) -> str | None:
+    """Return why an effect cannot have this many more regions and shutters; None: it can."""
+    if len(effect.regions) + regions > limits.MAX_REGIONS:
+        return rpt_("An effect can have at most {most} regions").format(most=limits.MAX_REGIONS)
+    if len(effect.shutters) + shutters > limits.MAX_SHUTTERS:
+        return rpt_("An effect can have at most {most} shutters").format(most=limits.MAX_SHUTTERS)
+    return None

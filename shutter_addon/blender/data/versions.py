@@ -15,7 +15,7 @@ from bpy.types import Scene
 from ...core import threads
 from ...core.farm.job_file import EditVersion
 from ...media import MediaError, derived
-from . import external_files, source_media, strips
+from . import external_files, requirements, source_media, strips
 
 MANIFEST = Path(__file__).parents[3] / "blender_manifest.toml"
 _FEW = 256  # files: of longer sequences, only blocks are hashed, because reading all would take hours
@@ -61,7 +61,7 @@ def read_files(scene: Scene) -> list[Path]:
 
 def _footage_files(scene: Scene) -> Iterator[list[Path]]:
     """Yield lists of the files that the edit's pictures are made from: of strips, of shown edits, and of other data."""
-    for shown in strips.shown_scenes(scene):
+    for shown in requirements.shown_scenes(scene):
         for strip in shown.sequence_editor.strips_all:
             if strip.type in strips.SOURCES:
                 with suppress(MediaError):  # it shows nothing

@@ -43,7 +43,7 @@ def choose(wanted: str, *, window_waits: bool = False) -> tuple[str, str | None]
     """
     if wanted == "cpu":
         return "cpu", None
-    lacking = []
+    lacking, is_main = [], threading.current_thread() is threading.main_thread()
     if wanted != "blender":
         if (why := opengl().lacking) is None:
             return "opengl", None
@@ -53,9 +53,7 @@ def choose(wanted: str, *, window_waits: bool = False) -> tuple[str, str | None]
             lacking.append(
                 rpt_("View > Render Sequencer Animation cannot use Blender's own GPU, as Render > Render Animation can")
             )
-        elif not bpy.app.background or (
-            threading.current_thread() is threading.main_thread() and opens_in_background()
-        ):
+        elif not bpy.app.background or (is_main and opens_in_background()):
             way = "blender" if bpy.app.background else "relayed"
             return way, f"{lacking[0]}; composing on Blender's own GPU, {name(way)}" if wanted == "auto" else None
         else:

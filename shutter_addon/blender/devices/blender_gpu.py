@@ -19,12 +19,13 @@ import bpy
 import gpu
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
+from gpu.types import GPUTexture
 
 from ...devices.device import Budget, Device, NoDeviceError, Texture, allowed, machine_memory, texel_bytes
 from ...devices.llvmpipe import is_llvmpipe
 from ...devices.passes import Pass, read_pass
 
-TYPES = {"sampler2DArray": "FLOAT_2D_ARRAY", "usampler2DArray": "UINT_2D_ARRAY"}
+_TYPES = {"sampler2DArray": "FLOAT_2D_ARRAY", "usampler2DArray": "UINT_2D_ARRAY"}
 _AS_IT_IS, _WHOLE, _OPAQUE_BYTES, _PAIRS_OF_BYTES, _SIXTEEN_BITS = range(5)
 # GLSL format: NumPy's type, the format that is sent, how it is unpacked (UNPACK). Only passes use rgba16ui and
 # rgba32ui: floats cannot hold them, and Blender reads whole numbers only of one component.
@@ -49,7 +50,7 @@ def has_context() -> bool:
     crash Blender then.
     """
     try:
-        gpu.types.GPUTexture((1, 1))
+        GPUTexture((1, 1))
     except (RuntimeError, SystemError):  # SystemError: in the background without gpu.init()
         return False
     return True
@@ -113,10 +114,10 @@ class BlenderDevice(Device):
             self.run(LETTING_GO, (1, 1), textures=spares, images=spares, layer=0)
         return nullcontext(self)
 
-    def _make(self, width: int, height: int, layers: int, kind: str) -> gpu.types.GPUTexture:
+    def _make(self, width: int, height: int, layers: int, kind: str) -> GPUTexture:
         return _new((width, height), kind.upper(), layers=layers)
 
-    def _free(self, own: gpu.types.GPUTexture) -> None:
+    def _free(self, own: GPUTexture) -> None:
         free(own)
 
     def write(self, texture: Texture, array: np.ndarray, layer: int = 0, *, opaque: bool = False) -> None:
@@ -139,7 +140,7 @@ class BlenderDevice(Device):
         data = _buffer("FLOAT", _packed(frame, _OPAQUE_BYTES))
         return Texture(None, (width, height, 1), "r32f", _new((width, height), "R32F", data))
 
-    def _send(self, stored: gpu.types.GPUTexture, program: Pass, sent: tuple, top: int, layer: int) -> None:
+    def _send(self, stored: GPUTexture, program: Pass, sent: tuple, top: int, layer: int) -> None:
         """Send numbers and unpack them into a layer. sent: arguments of _new."""
         textures, size = {"sent": _new(*sent)}, sent[0]
         constants = {"size": size, "top": top, "layer": layer}
@@ -158,7 +159,7 @@ class BlenderDevice(Device):
             array = np.rint(array * np.float32(np.iinfo(dtype).max))
         return array.astype(dtype, copy=False)
 
-    def _read(self, texture: gpu.types.GPUTexture, *arguments: Any) -> None:
+    def _read(self, texture: GPUTexture, *arguments: Any) -> None:
         _read_layer(texture, *arguments)
 
     def _dispatch(self, program: Pass, groups: tuple[int, ...], textures: dict, images: dict, *given: Mapping) -> None:
@@ -186,16 +187,13 @@ class BlenderDevice(Device):
 
 def texel(texture: Texture, x: int, y: int) -> np.ndarray:
     """Return the numbers (4 · layers,) float32 of all layers of an rgba32f texture at one texel."""
-    layers = texture.size[2]
-    values = np.empty((layers, 4), np.float32)
+    values = np.empty((texture.size[2], 4), np.float32)
     for layer, pixel in enumerate(values):
         _read_layer(texture.gpu, layer, (x, y, 1, 1), 4, "FLOAT", pixel)
     return values.reshape(-1)
 
 
-def _read_layer(
-    texture: gpu.types.GPUTexture, layer: int, box: tuple, components: int, kind: str, pixels: np.ndarray
-) -> None:
+def _read_layer(texture: GPUTexture, layer: int, box: tuple, components: int, kind: str, pixels: np.ndarray) -> None:
     """Read a box (left, bottom, width, height) of a layer. GPUTexture.read() reads only the first layer."""
     framebuffer = gpu.types.GPUFrameBuffer(color_slots={"texture": texture, "layer": layer})
     with framebuffer.bind():
@@ -225,12 +223,10 @@ def _trial() -> list[str]:
     return [bpy.app.binary_path, *options, "--python-expr", "import gpu; gpu.init()"]
 
 
-def _new(
-    size: tuple[int, int], kind: str, data: gpu.types.Buffer | None = None, layers: int = 1
-) -> gpu.types.GPUTexture:
+def _new(size: tuple[int, int], kind: str, data: gpu.types.Buffer | None = None, layers: int = 1) -> GPUTexture:
     """Return a texture, filled with numbers. Raise NoDeviceError if the GPU has no room for it."""
     try:
-        return gpu.types.GPUTexture(size, layers=layers, format=kind, data=data)
+        return GPUTexture(size, layers=layers, format=kind, data=data)
     except RuntimeError as error:
         raise NoDeviceError(str(error)) from None
 
@@ -249,20 +245,26 @@ def _packed(array: np.ndarray, packing: int) -> np.ndarray:
     return array.astype(np.float32, copy=False)
 
 
-def _compiled(program: Pass) -> gpu.types.GPUShader:
+def shader_info(samplers: Mapping[str, str], constants: Mapping[str, str]) -> gpu.types.GPUShaderCreateInfo:
+    """Return the description of a shader with these samplers and constants, by name with their GLSL types."""
     info = gpu.types.GPUShaderCreateInfo()
+    for slot, (name, kind) in enumerate(samplers.items()):
+        info.sampler(slot, _TYPES[kind], name)
+    for name, kind in constants.items():
+        info.push_constant(kind.upper(), name)
+    return info
+
+
+def _compiled(program: Pass) -> gpu.types.GPUShader:
+    info = shader_info(program.samplers, program.constants)
     for name, value in program.defines.items():
         info.define(name, str(value))
-    for slot, (name, kind) in enumerate(program.samplers.items()):
-        info.sampler(slot, TYPES[kind], name)
     for slot, (name, image) in enumerate(program.images.items()):
         kind = "UINT_2D_ARRAY" if image.format.endswith("ui") else "FLOAT_2D_ARRAY"
         qualifiers = {way for way, used in (("READ", image.reads), ("WRITE", image.writes)) if used}
         info.image(slot, image.format.upper(), kind, name, qualifiers=qualifiers)
     for slot, (name, length) in enumerate(program.blocks.items()):
         info.uniform_buf(slot, "vec4", f"{name}[{length}]")
-    for name, kind in program.constants.items():
-        info.push_constant(kind.upper(), name)
     info.local_group_size(*program.local_size)
     info.compute_source(program.body)
     return gpu.shader.create_from_info(info)

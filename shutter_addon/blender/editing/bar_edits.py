@@ -11,7 +11,7 @@ from bpy.types import Context, FCurve, PropertyGroup, Scene, Strip
 from ...core import revision
 from ...core.model import shutters
 from ...core.model.choices import COMBINES
-from ..data import fcurves, snapshot
+from ..data import fcurves, snapshot, strips
 from ..data.consistency import bars
 from ..rendering import effect_source, invalidation, sessions
 
@@ -29,22 +29,19 @@ def summary(weights: np.ndarray, combine: str = "AVERAGE") -> str:
     return words.format(angle=f"{angle:.0f}", frames=f"{angle / 360 * window:.3g}", window=window)
 
 
-def open_for(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> str | None:
-    """Return a text about how many frames a shutter whose exposure length varies is open at the current frame.
-
-    None: the bars tell it, or there is no picture. The result is kept until something changes.
-    """
-    shutter, frame = effect.shutters[index], scene.frame_current
+def told(scene: Scene, effect: PropertyGroup, strip: Strip, weights: np.ndarray) -> str:
+    """Return a text about the active shutter's bars (L,): `summary`, or how many frames an exposure whose length varies
+    is open for at the current frame. The result is kept until something changes."""
+    index, frame = effect.active_shutter, scene.frame_current
+    shutter = effect.shutters[index]
     has_length = shutter.length == "TIMELINE" or (shutter.follow != "NOTHING" and shutter.length == "MOTION")
-    is_shown = strip.left_handle <= frame < strip.right_handle and not bpy.app.is_job_running("RENDER")
-    if not (has_length and is_shown):
-        return None
-    try:
-        state = sessions.of_drawing().request(invalidation.current(scene, effect, strip, frame), frame).state
-    except effect_source.FAULTS:  # the live preview shows the error
-        return None
-    words, frames = iface_("Open for {frames} of {window} frames here"), shutters.are_open(state.bars[index])
-    return words.format(frames=np.count_nonzero(frames), window=state.options.window)
+    if has_length and strips.is_at(strip, frame) and not bpy.app.is_job_running("RENDER"):
+        with suppress(*effect_source.FAULTS):  # the live preview shows the error
+            state = sessions.of_drawing().request(invalidation.current(scene, effect, strip, frame), frame).state
+            count = np.count_nonzero(shutters.are_open(state.bars[index]))
+            words = iface_("Open for {frames} of {window} frames here")
+            return words.format(frames=count, window=state.options.window)
+    return summary(weights, shutter.combine)
 
 
 def set_bars(shutter: PropertyGroup, weights: Sequence[float] | np.ndarray) -> None:

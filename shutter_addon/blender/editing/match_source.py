@@ -22,8 +22,6 @@ from ..data.annotations import layers_of
 from ..data.property_copy import for_a_while
 from . import add_effect
 
-_RANGE = n_("range")
-
 
 def strip_and_source(effect: PropertyGroup) -> list[Strip]:
     """Return the strip of an effect and its source; []: one of them is missing."""
@@ -59,7 +57,7 @@ def _compare(effect: PropertyGroup) -> Shown | None:
     look, wanted = _looks(strip), _looks(source)
     words = [word for word in add_effect.LOOK if look[word] != wanted[word]]
     if _goal(effect, strip, source)[:2] != (strip.left_handle, strip.right_handle):
-        words.append(_RANGE)
+        words.append(n_("range"))
     # The engine reads the file, without modifiers.
     modifiers = Counter(modifier.type for modifier in source.modifiers if not modifier.mute)
     lacks_modifiers = bool(modifiers - Counter(modifier.type for modifier in strip.modifiers))

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_iface as iface_
-from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import PropertyGroup, Scene
 
@@ -35,8 +34,6 @@ _COMPONENTS = (("location", 0), ("location", 1), ("rotation", 0), ("scale", 0))
 CHANNELS = ("location", "rotation", "scale")
 # Influence of a region and of the camera.
 ENDS = "opacity", "influence"
-_LOCKED = n_('{place}: the F-curve of "{channel}" is locked')
-_MUTED = n_('{place}: the F-curve of "{channel}" is muted')
 _COUNTS = {"LOCATION": 2, "ROTATION": 3, "SCALE": 4}
 _DIGITS = 6  # of measured numbers: far below a pixel, but above errors that depend on the number of threads
 _STEADY = 0.25  # pixels by which keyframes of the camera may be off, since it moves the whole picture
@@ -185,14 +182,12 @@ def check_curves(effect: PropertyGroup, index: int | None) -> None:
         for curve in fcurves.curves_under(effect.id_data, f"{moving.path_from_id()}.{name}"):
             for part in filter(None, (curve, curve.group)):
                 if part.lock or part.mute:
-                    sentence = _LOCKED if part.lock else _MUTED
+                    sentence = rpt_('{place}: the F-curve of "{channel}" is locked or muted')
                     label = iface_(moving.bl_rna.properties[name].name)
-                    raise EffectError(rpt_(sentence).format(place=validation.place(moving), channel=label))
+                    raise EffectError(sentence.format(place=validation.place(moving), channel=label))
 
 
-def insert(
-    effect: PropertyGroup, index: int | None, channels: Sequence[str] = CHANNELS, *, begins: bool = False
-) -> None:
+def insert(effect: PropertyGroup, index: int | None, names: Sequence[str] = CHANNELS, *, begins: bool = False) -> None:
     """Key channels of a region or the camera at the scene's current frame, as the user's keyframes with full
     confidence.
 
@@ -208,7 +203,7 @@ def insert(
     path, pace, frame = moving.path_from_id(), fcurves.stretched(scene), scene.frame_current
     if not begins and pace != 1:
         frame = round(frame / pace, 3)
-    for name in channels:
+    for name in names:
         tracked = [_tracked_value(curve, frame) for curve in _curves(scene, f"{path}.{name}")]
         # Without a frame, Blender would use the one of the window's scene, which may be another one.
         scene.keyframe_insert(f"{path}.{name}", group=moving.name, frame=frame * pace)

@@ -396,11 +396,9 @@ def _follow_mixing(strip: Strip, source: Strip, *, is_encoded: bool) -> None:
     if strip.color_multiply not in (1, strips.IN_CODE_VALUES):
         return
     scene, path = strip.id_data, strip.path_from_id()
-    mixes = (
-        not sole_effect.has_values(strip.transform, sole_effect.IN_PLACE)
-        or strip.transform.filter.startswith("CUBIC")
-        or sole_effect.has_animation(scene, f"{path}.transform.")
-    )
+    stays = sole_effect.has_values(strip.transform, sole_effect.IN_PLACE)
+    stays = stays and not sole_effect.has_animation(scene, f"{path}.transform.")
+    mixes = not stays or strip.transform.filter.startswith("CUBIC")
     same_space = source_media.reading(source)[0] == scene.sequencer_colorspace_settings.name
     factor = strips.IN_CODE_VALUES if mixes and is_encoded and same_space else 1
     if strip.color_multiply != factor and not sole_effect.has_animation(scene, f"{path}.color_multiply"):

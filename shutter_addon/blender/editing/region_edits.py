@@ -13,25 +13,15 @@ from bpy.types import AnnotationLayer, PropertyGroup, Strip
 
 from ...core import revision
 from ...core.messages import EffectError
-from ...core.model import limits
 from ...core.model.effect import Drawings
 from ...core.model.motions import Placement
 from ...core.model.outlines import Curves
 from ...core.model.scribbles import mapped
 from ..data import annotations, fcurves, selection, snapshot, strips
 from ..data.annotations import LAYERS, NOT_THIS, annotation, layer_of, layers_of
-from ..data.consistency import bars, choose_region, color_layers, forget_followed, unique
+from ..data.consistency import bars, choose_region, color_layers, refollow, unique
 from ..data.sampled import Sampling
 from . import motion_keys
-
-
-def why_full(effect: PropertyGroup, *, regions: int = 0, shutters: int = 0) -> str | None:
-    """Return why an effect cannot have this many more regions and shutters; None: it can."""
-    if regions and len(effect.regions) + regions > limits.MAX_REGIONS:
-        return rpt_("An effect can have at most {most} regions").format(most=limits.MAX_REGIONS)
-    if shutters and len(effect.shutters) + shutters > limits.MAX_SHUTTERS:
-        return rpt_("An effect can have at most {most} shutters").format(most=limits.MAX_SHUTTERS)
-    return None
 
 
 def add_region(
@@ -130,15 +120,15 @@ def remove_region(effect: PropertyGroup, index: int) -> None:
     remove_layers(effect, effect.regions[index])
     name = effect.regions[index].name
     fcurves.remove_item(effect, "regions", index)
-    forget_followed(effect, name)
+    refollow(effect, name, None)
     effect.active_region = min(effect.active_region, max(len(effect.regions) - 1, 0))
     choose_region(effect)
 
 
-def move_region(effect: PropertyGroup, index: int, to: int) -> None:
-    """Move a region in the list. Later regions cover earlier ones."""
-    fcurves.move_item(effect, "regions", index, to)
-    effect.active_region = to
+def move(effect: PropertyGroup, kind: str, index: int, to: int) -> None:
+    """Move a "shutter" or a "region" in its list. The first shutter is the default, and later regions cover others."""
+    fcurves.move_item(effect, f"{kind}s", index, to)
+    setattr(effect, f"active_{kind}", to)
 
 
 def assign_region(effect: PropertyGroup, index: int, shutter: PropertyGroup) -> None:

@@ -9,7 +9,7 @@ from ...media import opencv
 from ..data import fcurves, property_copy, validation
 from ..data.consistency import unique
 from . import bar_edits
-from .region_edits import add_region, assign_region, remove_region
+from .region_edits import add_region, assign_region, move, remove_region
 
 # Distinct for color-blind people: seven by Okabe and Ito (https://jfly.uni-koeln.de/color), and the three farthest from
 # them for all eyes.
@@ -66,8 +66,7 @@ def apply_preset(effect: PropertyGroup, index: int, preset: str, key: bool = Fal
     """
     shutter, window = effect.shutters[index], validation.number(effect, "window")
     shutter.preset, shutter.preset_position = preset, effect.position
-    weights = shutters.preset_bars(preset, window, effect.position.lower())
-    bar_edits.paint(effect, index, weights, key)
+    bar_edits.paint(effect, index, shutters.preset_bars(preset, window, effect.position.lower()), key)
 
 
 def _free_color(effect: PropertyGroup) -> tuple[float, float, float]:
@@ -84,8 +83,7 @@ def duplicate_shutter(effect: PropertyGroup, index: int) -> PropertyGroup:
     property_copy.copy_properties(effect.shutters[index], new)
     new.name, new.color = new.name, color  # setting a used name adds a number
     fcurves.copy_curves(scene, f"{path}[{index}].", scene, f"{path}[{last}].")
-    move_shutter(effect, last, index + 1)
-    effect.active_shutter = index + 1
+    move(effect, "shutter", last, index + 1)
     return effect.shutters[index + 1]
 
 
@@ -96,12 +94,6 @@ def remove_shutter(effect: PropertyGroup, index: int) -> None:
         remove_region(effect, i)
     fcurves.remove_item(effect, "shutters", index)
     effect.active_shutter = min(effect.active_shutter, max(len(effect.shutters) - 1, 0))
-
-
-def move_shutter(effect: PropertyGroup, index: int, to: int) -> None:
-    """Move a shutter in the list. The first one is the default."""
-    fcurves.move_item(effect, "shutters", index, to)
-    effect.active_shutter = to
 
 
 def add_time_map(effect: PropertyGroup, ramp: str) -> PropertyGroup:
@@ -123,7 +115,7 @@ def ramp_between(
 ) -> PropertyGroup:
     """Add two shutters, by name and preset, and a ramp between them. The first one becomes the default."""
     add_shutter(effect, *first)
-    move_shutter(effect, effect.active_shutter, 0)
+    move(effect, "shutter", effect.active_shutter, 0)
     return add_region(effect, add_shutter(effect, *last), "RAMP", name, ramp=ramp)
 
 
@@ -138,8 +130,7 @@ def as_layer(effect: PropertyGroup, index: int, own: str, rest: str, key: bool =
     region = effect.regions[index]
     place = effect.shutters.find(region.shutter)
     if place <= 0 or any(other.shutter == region.shutter for other in effect.regions if other != region):
-        names = {shutter.name for shutter in effect.shutters}
-        shutter = add_shutter(effect, unique(data_("Subject"), names))
+        shutter = add_shutter(effect, unique(data_("Subject"), {shutter.name for shutter in effect.shutters}))
         assign_region(effect, index, shutter)
         place = len(effect.shutters) - 1
     effect.regions[index].is_layer = True

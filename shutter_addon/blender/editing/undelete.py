@@ -29,8 +29,8 @@ def keep(effect: PropertyGroup) -> None:
 
 def copy(effect: PropertyGroup, strip: Strip) -> None:
     """Keep an effect for `paste`."""
-    first, skipped, places = strip.left_handle, strips.skipped(strip), match_source.places(effect, strip)
-    _keep(_COPIED, effect, first=first, skipped=skipped, places=places)
+    places = match_source.places(effect, strip)
+    _keep(_COPIED, effect, first=strip.left_handle, skipped=strips.skipped(strip), places=places)
 
 
 def has_copy() -> bool:

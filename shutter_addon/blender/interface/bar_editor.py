@@ -110,9 +110,7 @@ class SHUTTER_GT_bars(Dragged, Gizmo):
     def show(self, context: Context, seen: tuple) -> None:
         scene, effect, strip, bars, states = seen
         shutter = selection.active_shutter(effect)
-        words = bar_edits.open_for(scene, effect, strip, effect.active_shutter)
-        words = words or bar_edits.summary(bars, shutter.combine)
-        place = _layout(context, bars)
+        words, place = bar_edits.told(scene, effect, strip, bars), _layout(context, bars)
         _draw(place, shutter, bars, states)
         _draw_header(place, shutter, effect.active_shutter, f"{shutter.name}   {words}")
 
@@ -166,15 +164,11 @@ def _draw(place: Layout, shutter: PropertyGroup, values: np.ndarray, states: lis
     drawing.rectangles([place.frame], [drawing.BACK])
     boxes = drawing.bars(place.box, np.minimum(values / place.top, 1.0), (*shutter.color, 0.95))
     keyed = [i for i, state in enumerate(states) if state]
-    drawing.rectangles(
-        [(boxes[i][0], bottom - foot - thin, boxes[i][2], bottom - thin) for i in keyed],
-        [(*colors[states[i]][:3], 1.0) for i in keyed],
-    )
+    feet = [(boxes[i][0], bottom - foot - thin, boxes[i][2], bottom - thin) for i in keyed]
+    drawing.rectangles(feet, [(*colors[states[i]][:3], 1.0) for i in keyed])
     ticks = range(0, place.count + 1, max(1, 4 * (place.count // 32), 4 if place.count > 8 else 1))
-    drawing.rectangles(
-        [(edges[k] - thin / 2, bottom - 2 * foot - thin, edges[k] + thin / 2, bottom - thin) for k in ticks],
-        np.tile((1, 1, 1, 0.5), (len(ticks), 1)),
-    )
+    marks = [(edges[k] - thin / 2, bottom - 2 * foot - thin, edges[k] + thin / 2, bottom - thin) for k in ticks]
+    drawing.rectangles(marks, [(1, 1, 1, 0.5)] * len(ticks))
 
 
 def _draw_header(place: Layout, shutter: PropertyGroup, index: int, words: str) -> None:

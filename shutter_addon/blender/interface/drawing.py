@@ -59,10 +59,8 @@ def pixel_space(region: Region) -> Iterator[None]:
     """Use the region's pixels as coordinates. Blender's own state varies between draw handlers."""
     with gpu.matrix.push_pop(), gpu.matrix.push_pop_projection():
         gpu.matrix.load_identity()
-        width, height = region.width, region.height
-        gpu.matrix.load_projection_matrix(
-            Matrix(((2 / width, 0, 0, -1), (0, 2 / height, 0, -1), (0, 0, 1, 0), (0, 0, 0, 1)))
-        )
+        x, y = 2 / region.width, 2 / region.height
+        gpu.matrix.load_projection_matrix(Matrix(((x, 0, 0, -1), (0, y, 0, -1), (0, 0, 1, 0), (0, 0, 0, 1))))
         yield
 
 
@@ -154,13 +152,6 @@ def text(x: float, y: float, words: str, until: float | None = None) -> None:
     blf.disable(0, blf.CLIPPING)
 
 
-def plated(x: float, y: float, words: str) -> None:
-    """Draw text on a dark background."""
-    pad = 4 * ui_scale()
-    rectangles([(x - pad, y - pad - 1, x + text_width(words) + pad, y + SIZE * ui_scale() + pad)], [BACK])
-    text(x, y, words)
-
-
 def text_width(words: str) -> float:
     """Return the width of a text in pixels."""
     blf.size(0, SIZE * ui_scale())
@@ -216,11 +207,7 @@ def shader_of(name: str) -> GPUShader:
     if name not in Quad.shaders:
         quad, shown = read_pass("show", "QUAD"), read_pass("show", name)
         between = gpu.types.GPUStageInterfaceInfo("show_interface")
-        info = gpu.types.GPUShaderCreateInfo()
-        for constant, kind in (quad.constants | shown.constants).items():
-            info.push_constant(kind.upper(), constant)
-        for slot, (sampler, kind) in enumerate(shown.samplers.items()):
-            info.sampler(slot, blender_gpu.TYPES[kind], sampler)
+        info = blender_gpu.shader_info(shown.samplers, quad.constants | shown.constants)
         for slot, (given, kind) in enumerate(quad.ins.items()):
             info.vertex_in(slot, kind.upper(), given)
         for given, kind in quad.outs.items():

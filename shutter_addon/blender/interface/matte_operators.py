@@ -9,10 +9,9 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy.types import Context, Operator, PropertyGroup
 from bpy_extras.io_utils import ImportHelper
 
-from ...core.messages import UserError
 from ...core.model.choices import RAMPS
 from ...core.model.limits import MAX_CHANNEL
-from ..data import matte_content, recipe_import, selection, strips
+from ..data import matte_content, recipe_import, selection, strips, validation
 from ..editing import region_edits, shutter_edits
 from ..output import matte_export
 from . import needs
@@ -26,9 +25,7 @@ class SHUTTER_OT_matte_add(OfEffect, ImportHelper, Operator):
     icon = "FILE_MOVIE"
     needs = (needs.room_for_a_region,)
 
-    channel_name: given(
-        StringProperty, "Channel Name", "Name of a channel of an EXR file; empty for the luminance", maxlen=MAX_CHANNEL
-    )
+    channel_name: given(StringProperty, "Channel Name", "Channel of an EXR file; empty: luminance", maxlen=MAX_CHANNEL)
     # What the file browser shows
     filter_movie: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
     filter_image: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
@@ -58,6 +55,9 @@ def matte_strip(self: Operator, _context: Context, effect: PropertyGroup) -> Non
     matte_content.choose_strip(region, self.strip)
 
 
+_FORMATS = (("PNG", "PNG", "Grey, 16 bits"), ("EXR", "OpenEXR", "Float, in the channel Y"))
+
+
 class SHUTTER_OT_matte_export(OfEffect, ImportHelper, Operator):
     """Write the active matte or outline as pictures, one for each frame of its strip, for other programs"""
 
@@ -67,20 +67,13 @@ class SHUTTER_OT_matte_export(OfEffect, ImportHelper, Operator):
     needs = (needs.a_cover,)
 
     directory: StringProperty(name="Folder", subtype="DIR_PATH", options={"SKIP_SAVE"})
-    format: EnumProperty(
-        name="Format",
-        description="File format of the pictures",
-        items=(("PNG", "PNG", "Grey, 16 bits"), ("EXR", "OpenEXR", "Float, in the channel Y")),
-    )
+    format: EnumProperty(name="Format", description="File format of the pictures", items=_FORMATS)
     filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
 
     def change(self, _context: Context, effect: PropertyGroup) -> None:
         folder = Path(bpy.path.abspath(self.directory or str(Path(self.filepath).parent)))
         region, word = selection.active_region(effect), self.format.lower()
-        try:
-            count = matte_export.save(self.edit, effect, self.effect_strip, region, folder, word)
-        except OSError as error:
-            raise UserError(f"{folder}: {error.strerror or error}") from None
+        count = matte_export.save(self.edit, effect, self.effect_strip, region, folder, word)
         self.report({"INFO"}, rpt_('Saved {count} pictures in "{folder}"').format(count=count, folder=folder))
 
 
@@ -94,7 +87,7 @@ def ramp_add(self: Operator, _context: Context, effect: PropertyGroup) -> None:
 
 
 def _why_no_time_map(effect: PropertyGroup) -> str | None:
-    return region_edits.why_full(effect, regions=1, shutters=2)
+    return validation.why_full(effect, regions=1, shutters=2)
 
 
 @operator("Time Map", needs.a_shutter, _why_no_time_map, icon="TIME", ramp=_RAMP)

@@ -7,8 +7,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import PropertyGroup
 
 from ...core.model.choices import DRAWN
-from ..data import selection, strips
-from ..editing import region_edits
+from ..data import selection, strips, validation
 from .operator_bases import Need
 
 
@@ -42,8 +41,8 @@ a_cover = _of_kind(strips.LAID, n_("The region is not a matte, ramp, outline or 
 
 
 def room_for_a_region(effect: PropertyGroup) -> str | None:
-    return a_shutter(effect) or region_edits.why_full(effect, regions=1)
+    return a_shutter(effect) or validation.why_full(effect, regions=1)
 
 
 def room_for_a_shutter(effect: PropertyGroup) -> str | None:
-    return region_edits.why_full(effect, shutters=1)
+    return validation.why_full(effect, shutters=1)

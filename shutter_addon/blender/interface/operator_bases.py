@@ -9,7 +9,7 @@ from bpy.props import EnumProperty
 from bpy.types import Context, Event, Operator, PropertyGroup
 
 from ...core import recent_errors
-from ...core.messages import UserError
+from ...core.messages import UserError, sentence
 from ...core.recipes import recipe
 from ..data import selection
 from ..rendering.effect_source import FAULTS
@@ -28,20 +28,14 @@ def redraw(context: Context) -> None:
                 area.tag_redraw()
 
 
-def report(operator: Operator, sentence: str, kind: str = "WARNING") -> set[str]:
+def report(operator: Operator, words: str, kind: str = "WARNING") -> set[str]:
     """Report a translated sentence as a warning or error, and keep it for *Copy Report* without its names.
 
     Return the result of an operator that has changed nothing.
     """
     recent_errors.record(level=2)
-    operator.report({kind}, sentence)
+    operator.report({kind}, words)
     return {"CANCELLED"}
-
-
-def popup(context: Context, words: str, **looks: str) -> None:
-    """Show a translated sentence in a popup at the pointer."""
-    show = context.window_manager.popup_menu
-    show(lambda menu, _context: menu.layout.label(text=words, translate=False), **looks)
 
 
 def given(kind: Callable, name: str, description: str, **more: Any) -> Any:
@@ -81,9 +75,9 @@ class Named(Mixin):
     @classmethod
     def poll(cls, context: Context) -> bool:
         """Grey the operator out and show the reason, if there is one."""
-        if sentence := cls.refusal(context):
-            cls.poll_message_set(sentence)
-        return not sentence
+        if why := cls.refusal(context):
+            cls.poll_message_set(why)
+        return not why
 
     @classmethod
     def refusal(cls, context: Context) -> str | None:
@@ -96,6 +90,9 @@ class Named(Mixin):
             return step(*arguments) or {"FINISHED"}
         except (*FAULTS, UserError) as error:
             return report(self, str(error), "ERROR")
+        except OSError as error:  # of an operator with a file browser, for what it writes
+            words = f"{getattr(self, 'directory', '') or self.filepath}: {error.strerror or error}"
+            return report(self, sentence(words), "ERROR")
 
 
 class OfEffect(Named):
@@ -130,26 +127,21 @@ class OfEffect(Named):
 
 
 def operator(
-    label: str,
-    *needs: Need,
-    icon: str = "NONE",
-    options: set[str] = UNDOABLE,
-    only_seen: bool = False,
-    **properties: Any,
+    label: str, *needs: Need, icon: str = "NONE", options: set[str] = UNDOABLE, only_seen: bool = False, **own: Any
 ) -> Callable[[Change], type[Operator]]:
     """Make an operator from a function that changes an effect. Its name, label and docstring become the operator's.
 
-    Other arguments are those of OfEffect, and properties of the operator, of which menus show the choices of the first.
+    Other arguments are those of OfEffect, and its `own` properties, of which menus show the choices of the first.
     """
 
     def made(change: Change) -> type[Operator]:
         content = {
             "__doc__": change.__doc__,
             "__module__": change.__module__,
-            "__annotations__": properties,
+            "__annotations__": own,
             "bl_label": label,
             "icon": icon,
-            "choices": next((name for name, made in properties.items() if made.function is EnumProperty), ""),
+            "choices": next((name for name, made in own.items() if made.function is EnumProperty), ""),
             "bl_options": options,
             "only_seen": only_seen,
             "needs": needs,

@@ -1,6 +1,6 @@
 """Operators of effects, shutters, regions and recipes. Each calls a function of `editing`."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
@@ -11,21 +11,13 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, St
 from bpy.types import Context, Event, Operator, PropertyGroup
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
-from ...core.messages import EffectError, UserError
+from ...core.messages import EffectError
 from ...core.model import shutters
 from ...core.model.choices import CONTEXT, DRAWN
 from ...core.recipes import recipe_file
-from ..data import annotations, consistency, data_format, preview_areas, recipe_import, selection, strips
+from ..data import annotations, consistency, data_format, preview_areas, recipe_import, selection, strips, validation
 from ..devices import main_thread
-from ..editing import (
-    add_effect,
-    bar_edits,
-    motion_keys,
-    region_edits,
-    shown_annotations,
-    shutter_edits,
-    undelete,
-)
+from ..editing import add_effect, bar_edits, motion_keys, region_edits, shown_annotations, shutter_edits, undelete
 from ..editing import match_source as matching
 from ..output import error_report, matte_export
 from . import needs, sharp_frame
@@ -158,20 +150,20 @@ def shutter_remove(_self: Operator, _context: Context, effect: PropertyGroup) ->
 _DIRECTION = EnumProperty(name="Direction", items=(("UP", "Up", ""), ("DOWN", "Down", "")), options={"SKIP_SAVE"})
 
 
-def _move(places: list[int], index: int, direction: str, move: Callable[[int, int], None]) -> set[str] | None:
-    """Move an item one place up or down among the places that the list shows."""
+def _move(effect: PropertyGroup, kind: str, direction: str, places: list[int]) -> set[str] | None:
+    """Move the active "shutter" or "region" one place up or down among those that the list shows."""
+    index = getattr(effect, f"active_{kind}")
     step = places.index(index) + (1 if direction == "DOWN" else -1)
     if not 0 <= step < len(places):
         return {"CANCELLED"}
-    move(index, places[step])
+    region_edits.move(effect, kind, index, places[step])
     return None
 
 
 @operator("Move Shutter", needs.a_shutter, direction=_DIRECTION)
 def shutter_move(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
     """Move the active shutter in the list (the first one is the default, used where nothing is drawn)"""
-    places = list(range(len(effect.shutters)))
-    return _move(places, effect.active_shutter, self.direction, partial(shutter_edits.move_shutter, effect))
+    return _move(effect, "shutter", self.direction, list(range(len(effect.shutters))))
 
 
 @kept
@@ -210,7 +202,7 @@ class SHUTTER_OT_bar_set(OfEffect, Operator):
     needs = (needs.a_shutter,)
 
     bar: IntProperty(name="Bar", description="Number of the bar, from 1", default=1, min=1)
-    weight: FloatProperty(name="Weight", description="Contribution of the bar's frame", min=0.0, soft_max=1.0)
+    weight: FloatProperty(name="Weight", description="Contribution of its frame", min=0.0, soft_max=1.0)
 
     def invoke(self, context: Context, event: Event) -> set[str]:
         if event.value == "DOUBLE_CLICK":  # from a menu, the pointer is anywhere
@@ -237,7 +229,7 @@ class SHUTTER_OT_bar_set(OfEffect, Operator):
 
 
 def _why_no_room(effect: PropertyGroup) -> str | None:
-    return region_edits.why_full(effect, regions=1 if selection.active_region(effect) is None else 0)
+    return validation.why_full(effect, regions=1 if selection.active_region(effect) is None else 0)
 
 
 class SHUTTER_OT_draw(MakesEffect, OfEffect, Operator):
@@ -257,13 +249,11 @@ class SHUTTER_OT_draw(MakesEffect, OfEffect, Operator):
         if self.not_this and (sentence := needs.a_subject(effect)):
             raise EffectError(sentence)
         if self.new or region is None or region.kind in strips.MATTES:
-            if sentence := region_edits.why_full(effect, regions=1):  # poll() does not know the value of `new`
+            if sentence := validation.why_full(effect, regions=1):  # poll() does not know the value of `new`
                 raise EffectError(sentence)
             region_edits.first_drawn(effect, selection.active_shutter(effect), self.kind)
         region_edits.begin_drawing(effect, self.effect_strip, effect.active_region)
-        layer = "not_layer" if self.not_this else "layer"
-        if not drawing_tool(context, effect, "builtin.annotate", layer):
-            self.report({"INFO"}, "Open a sequencer with a preview to draw")
+        _take_tool(self, context, effect, "builtin.annotate", "not_layer" if self.not_this else "layer")
         sharp_frame.show(context)
 
 
@@ -271,18 +261,14 @@ class SHUTTER_OT_draw(MakesEffect, OfEffect, Operator):
 def erase(self: Operator, context: Context, effect: PropertyGroup) -> None:
     """Erase strokes of the active region in the preview"""
     region_edits.begin_drawing(effect, self.effect_strip, effect.active_region, erases=True)
-    if not drawing_tool(context, effect, "builtin.annotate_eraser"):
-        self.report({"INFO"}, "Open a sequencer with a preview to erase")
+    _take_tool(self, context, effect, "builtin.annotate_eraser")
 
 
-def drawing_tool(context: Context, effect: PropertyGroup, tool: str, layer: str = "layer") -> bool:
+def _take_tool(by: Operator, context: Context, effect: PropertyGroup, tool: str, layer: str = "layer") -> None:
     """Make a layer of the active region the active annotation and activate a drawing tool in all previews.
 
     Args:
         layer: one of annotations.LAYERS.
-
-    Returns:
-        Whether there is a preview.
     """
     region = selection.active_region(effect)
     if annotations.layer_of(effect, region, layer) is None:
@@ -290,7 +276,8 @@ def drawing_tool(context: Context, effect: PropertyGroup, tool: str, layer: str 
     consistency.aim_pen(effect, layer)
     for _window, area in preview_areas.previews(context):
         shown_annotations.give(area.spaces.active, effect.scene.annotation)
-    return sharp_frame.take_up(context, tool)
+    if not sharp_frame.take_up(context, tool):
+        by.report({"INFO"}, "Open a sequencer with a preview to draw")
 
 
 @kept
@@ -317,9 +304,7 @@ def region_remove(_self: Operator, _context: Context, effect: PropertyGroup) -> 
 @operator("Move Region", needs.a_region, direction=_DIRECTION)
 def region_move(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
     """Move the active region in the list (later ones cover earlier ones)"""
-    name = selection.active_shutter(effect).name
-    places = [i for i, region in enumerate(effect.regions) if region.shutter == name]
-    return _move(places, effect.active_region, self.direction, partial(region_edits.move_region, effect))
+    return _move(effect, "region", self.direction, selection.own_regions(effect))
 
 
 @operator("Choose Source", icon="SEQUENCE", strip=STRIP)
@@ -333,7 +318,7 @@ def effect_copy(self: Operator, _context: Context, effect: PropertyGroup) -> Non
     """Copy the shutters, regions, keyframes and options of the effect, for other strips and scenes of this file"""
     undelete.copy(effect, self.effect_strip)
     if data_format.is_newer(self.edit):
-        report(self, rpt_("Copied without data of a newer version of Virtual Shutter"))
+        report(self, rpt_("Data of a newer version of Virtual Shutter is left out"))
 
 
 class SHUTTER_OT_effect_paste(MakesEffect, OfEffect, Operator):
@@ -377,15 +362,10 @@ class SHUTTER_OT_recipe_export(OfEffect, ExportHelper, Operator):
 
     def change(self, _context: Context, effect: PropertyGroup) -> None:
         path = chosen_file(self)
-        try:
-            recipe_file.save(matte_export.recipe_for(self.edit, effect, self.effect_strip, Path(path)), path)
-        except OSError as error:
-            raise UserError(f"{path}: {error.strerror or error}") from None
+        recipe_file.save(matte_export.recipe_for(self.edit, effect, self.effect_strip, Path(path)), path)
+        self.report({"INFO"}, rpt_('Saved "{path}"').format(path=path))
         if data_format.is_newer(self.edit):
-            words = rpt_('Saved "{path}" without data of a newer version of Virtual Shutter')
-            report(self, words.format(path=path))
-        else:
-            self.report({"INFO"}, rpt_('Saved "{path}"').format(path=path))
+            report(self, rpt_("Data of a newer version of Virtual Shutter is left out"))
 
 
 class SHUTTER_OT_copy_report(Named, Operator):

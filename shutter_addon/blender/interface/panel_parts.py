@@ -1,8 +1,7 @@
 """Parts of panels: sentences, lists, buttons, and the icons of presets and patterns."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cache
-from typing import Any
 
 import bpy.utils.previews
 import numpy as np
@@ -44,15 +43,15 @@ def sentence(layout: UILayout, words: str, icon: str = "NONE", room: float = 1.0
         row.label(text=line, icon=icon if i == 0 or icon == "NONE" else "BLANK1", translate=False)
 
 
-def draw_list(layout: UILayout, effect: PropertyGroup, kind: str, items: Sequence[PropertyGroup]) -> None:
+def draw_list(layout: UILayout, effect: PropertyGroup, kind: str, count: int) -> None:
     """Draw the list of shutters or regions with its buttons.
 
     Args:
         kind: "shutter" or "region".
-        items: those that the list shows.
+        count: number of items that the list shows.
     """
     row = layout.row()
-    rows = min(max(len(items), 1), _MOST_ROWS)
+    rows = min(max(count, 1), _MOST_ROWS)
     row.template_list(f"SHUTTER_UL_{kind}s", "", effect, f"{kind}s", effect, f"active_{kind}", rows=rows)
     column = row.column(align=True)
     if kind == "shutter":
@@ -62,7 +61,7 @@ def draw_list(layout: UILayout, effect: PropertyGroup, kind: str, items: Sequenc
     column.operator(f"shutter.{kind}_remove", text="", icon="REMOVE")
     if kind == "shutter":
         column.menu("SHUTTER_MT_shutters", text="", icon="DOWNARROW_HLT")
-    elif len(items) > 1:
+    elif count > 1:
         for direction, icon in (("UP", "TRIA_UP"), ("DOWN", "TRIA_DOWN")):
             column.operator(f"shutter.{kind}_move", text="", icon=icon).direction = direction
 
@@ -91,12 +90,7 @@ def draw_properties(layout: UILayout, owner: bpy.types.bpy_struct, *names: str) 
 
 
 def panel(
-    end: str,
-    label: str,
-    draws: Draws,
-    shows: Callable[[PropertyGroup], Any] | None = None,
-    within: str = "",
-    **look: object,
+    end: str, label: str, draws: Draws, shows: Callable | None = None, within: str = "", **look: object
 ) -> type[Panel]:
     """Make a panel of the Shutter tab that shows the effect, closed by default.
 
@@ -128,8 +122,7 @@ def menu(name: str, label: str) -> Callable[[Callable[[UILayout, Context], None]
         def draw(self: Menu, context: Context) -> None:
             draws(self.layout, context)
 
-        content = {"__module__": draws.__module__, "bl_label": label, "draw": draw}
-        return type(f"SHUTTER_MT_{name}", (Menu,), content)
+        return type(f"SHUTTER_MT_{name}", (Menu,), {"__module__": draws.__module__, "bl_label": label, "draw": draw})
 
     return made
 

@@ -65,9 +65,8 @@ class SHUTTER_UL_regions(UIList):
 
     def filter_items(self, _context: Context, effect: PropertyGroup, _property: str) -> tuple[list[int], list[int]]:
         """Show only the regions of the active shutter."""
-        shutter = selection.active_shutter(effect)
-        own = [bool(shutter) and region.shutter == shutter.name for region in effect.regions]
-        return [self.bitflag_filter_item if is_own else 0 for is_own in own], []
+        own = set(selection.own_regions(effect))
+        return [self.bitflag_filter_item if i in own else 0 for i in range(len(effect.regions))], []
 
 
 @menu("presets", "Presets")
@@ -112,7 +111,7 @@ class SEQUENCER_PT_shutter(Panel):
         shown = match_source.shown(effect)
         words = iface_("Source: {strip}").format(strip=shown.source) if shown else iface_("Choose Source")
         layout.operator_menu_enum("shutter.source", "strip", text=words, icon="SEQUENCE", translate=False)
-        draw_list(layout, effect, "shutter", effect.shutters)
+        draw_list(layout, effect, "shutter", len(effect.shutters))
         row = layout.row(align=True)
         draw_operators(row, "draw")
         region = selection.active_region(effect)
@@ -143,25 +142,14 @@ def _draw_exposure(layout: UILayout, scene: Scene, effect: PropertyGroup, strip:
     layout.prop(shutter, "length")
     if shutter.length == "MOTION" and shutter.follow != "NOTHING":
         layout.prop(shutter, "trail")
-    _draw_combine(layout, shutter)
+    layout.prop(shutter, "combine")
+    if shutter.combine in ("LIGHTEST", "DARKEST"):
+        draw_properties(layout, shutter, "by_luminance", "use_threshold")
+        if shutter.use_threshold:
+            draw_properties(layout, shutter, "threshold", "softness")
     draw_properties(layout, shutter, *(field.blender for field in fields_of(Shutter).values() if field.shown))
     draw_operators(layout, "tripod")
     _draw_bars(layout, scene, effect, strip)
-
-
-def _draw_combine(layout: UILayout, shutter: PropertyGroup) -> None:
-    """Draw how the active shutter combines frames."""
-    layout.prop(shutter, "combine")
-    if shutter.combine not in ("LIGHTEST", "DARKEST"):
-        return
-    layout.prop(shutter, "by_luminance")
-    row = layout.row(heading="Threshold")
-    row.prop(shutter, "use_threshold", text="")
-    number = row.row()
-    number.active = shutter.use_threshold
-    number.prop(shutter, "threshold", text="")
-    if shutter.use_threshold:
-        layout.prop(shutter, "softness")
 
 
 def _draw_bars(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
@@ -172,8 +160,7 @@ def _draw_bars(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Str
         sentence(layout, str(error), "ERROR")
         return
     is_open = bool(bars.any())
-    words = bar_edits.open_for(scene, effect, strip, effect.active_shutter)
-    words = words or bar_edits.summary(bars, effect.shutters[effect.active_shutter].combine)
+    words = bar_edits.told(scene, effect, strip, bars)
     sentence(layout, words, "NONE" if is_open else "ERROR", is_quiet=is_open)
 
 
@@ -247,9 +234,7 @@ class SHUTTER_PT_notes(Panel):
 
 def _draw_regions(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:
     layout.use_property_split = False
-    shutter = selection.active_shutter(effect)
-    own = [region for region in effect.regions if shutter and region.shutter == shutter.name]
-    draw_list(layout, effect, "region", own)
+    draw_list(layout, effect, "region", len(selection.own_regions(effect)))
     region = selection.active_region(effect)
     if region is not None:
         row = layout.row(align=True)
@@ -271,7 +256,10 @@ def _draw_regions(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip
         draw_operators(row, *_BUTTONS.get(region.kind, _BUTTONS["LINE"]))
         row.menu("SHUTTER_MT_of_outline", text="", icon="DOWNARROW_HLT")
     if region.kind in strips.LAID:
-        _draw_blend(layout, region)
+        draw_properties(layout, region, "opacity", "feather", "invert")
+        if not region.is_layer:  # a layer covers all mattes below
+            layout.prop(region, "blend")
+        draw_operators(layout, "matte_export")
     try:
         validation.check_moving(region)
     except EffectError as error:
@@ -294,15 +282,6 @@ def _draw_matte(layout: UILayout, region: PropertyGroup) -> None:
         layout.prop(region, "channel")
         if region.channel == "NAMED":
             layout.prop(region, "channel_name", text="Name")
-
-
-def _draw_blend(layout: UILayout, region: PropertyGroup) -> None:
-    """Draw how a matte, ramp or outline blends with the mattes below."""
-    for name in ("opacity", "feather", "invert", "blend"):
-        row = layout.row()
-        row.active = name != "blend" or not region.is_layer  # a layer covers all of them
-        row.prop(region, name)
-    draw_operators(layout, "matte_export")
 
 
 def _draw_transform(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:

@@ -68,9 +68,7 @@ class _Settings:
     split: float = Labelled(
         "Split Position", "Border between source and result, as a fraction of the picture's width"
     ).fixed(default=0.5, subtype="FACTOR")
-    probe: bool = Labelled(
-        "Probe", "Show the bars of the pixel under the pointer, and its share of each shutter"
-    ).switch()
+    probe: bool = Labelled("Probe", "Show bars of the pixel under the pointer, and its share of each shutter").switch()
     probe_at: tuple[float, float] = Labelled(
         "Probe Position", "Position of the probe, as fractions of the picture from its lower left corner"
     ).fixed(default=(-1.0, -1.0), least=-1e3, most=1e3)
@@ -223,8 +221,7 @@ def _show_strokes(context: Context, quad: Quad, shown: Shown, snapshot: Snapshot
     if not context.space_data.show_overlays:
         return
     frame = shown.scene.frame_current
-    shapes = snapshot.effect.drawn_at(frame)
-    for is_hidden, shape in zip(shown.hides_strokes, shapes, strict=True):
+    for is_hidden, shape in zip(shown.hides_strokes, snapshot.effect.drawn_at(frame), strict=True):
         if is_hidden:
             continue
         color = (*shown.effect.shutters[shape.shutter].color, shape.opacity)
@@ -245,8 +242,7 @@ def _show_source(quad: Quad, shown: Shown, renderer: Renderer, request: Request,
     following = request.state.following
     moving = following and following.of([following.moving()[0]])
     plain = replace(request, state=FrameState(options=options, bars=still, following=moving), levels=True)
-    texture = renderer.draw(plain)
-    quad.draw("PICTURE", {"picture": texture}, 0.0, right, opacity=shown.strip.blend_alpha)
+    quad.draw("PICTURE", {"picture": renderer.draw(plain)}, 0.0, right, opacity=shown.strip.blend_alpha)
 
 
 def _show_shares(
@@ -268,8 +264,12 @@ def draw_notes(region: Region, notes: list[str]) -> None:
     unit = drawing.ui_scale()
     left, right = 16 * unit, region.width - _NAVIGATION * unit
     lines = [line for note in notes for line in drawing.wrapped(note, right - left, drawing.SIZE)]
+    pad = 4 * unit
     for i, line in enumerate(lines):
-        drawing.plated(left, region.height - (36 + 18 * i) * unit, line)
+        y = region.height - (36 + 18 * i) * unit
+        box = left - pad, y - pad - 1, left + drawing.text_width(line) + pad, y + drawing.SIZE * unit + pad
+        drawing.rectangles([box], [drawing.BACK])
+        drawing.text(left, y, line)
 
 
 classes = (ShutterPreview,)

@@ -39,8 +39,7 @@ def probed_at(renderer: Renderer, request: Request, point: Sequence[float]) -> t
     values = blender_gpu.texel(texture, column // block, row // block)[: len(request.state.bars)]
     values = np.maximum(values, 0).astype(np.float64)
     coefficients = values / values.sum()
-    state = renderer.slid(request, known=True).state
-    return coefficients, compositor.mixed_shutter(state, coefficients)
+    return coefficients, compositor.mixed_shutter(renderer.slid(request, known=True).state, coefficients)
 
 
 def layout(point: Sequence[float], size: tuple[int, int], count: int, unit: float) -> tuple[Box, Box, list[float]]:
@@ -97,10 +96,9 @@ class SHUTTER_GT_probe(Gizmo):
         return -1
 
 
-def _draw(
-    region: Region, point: Sequence[float], shutters: Sequence[PropertyGroup], shares: np.ndarray, mixed: np.ndarray
-) -> None:
-    unit = drawing.ui_scale()
+def _draw(region: Region, point: Sequence[float], shutters: Sequence[PropertyGroup], *probed: np.ndarray) -> None:
+    """Draw the probe, with what `probed_at` has returned."""
+    unit, (shares, mixed) = drawing.ui_scale(), probed
     frame, bars, lines = layout(point, (region.width, region.height), len(shutters), unit)
     colors = np.array([shutter.color for shutter in shutters])
     (x, y), arm = point, 6 * unit

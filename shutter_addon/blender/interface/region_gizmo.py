@@ -13,9 +13,9 @@ from ...core.messages import EffectError
 from ...core.model import scribbles
 from ..data import selection, snapshot, validation
 from ..editing import bar_edits, motion_keys, region_edits
+from ..rendering import render_job
 from . import drawing
 from .gizmo_groups import TWEAK, Dragged, View, WithKeys, view
-from .operator_bases import popup
 
 _RADIUS = 7  # interface units: radius of a handle
 _NEAREST = 0.03  # fraction of the picture: least distance between the two handles
@@ -82,8 +82,7 @@ class SHUTTER_GT_region(Dragged, Gizmo):
             scene, effect, strip = selection.active(context)
             region = selection.active_region(effect)
             numbers = region.location, np.degrees(region.rotation), region.scale
-            strokes = _strokes_now(scene, effect, strip)
-            for points in scribbles.transform(strokes, *numbers, seen.view.aspect):
+            for points in scribbles.transform(_strokes_now(scene, effect, strip), *numbers, seen.view.aspect):
                 drawing.lines(seen.view.on_region(points), _MARK, width=2)
         if not self.turns:
             drawing.lines([seen.centre, seen.corner], (1, 1, 1, 0.4))
@@ -145,7 +144,7 @@ class SHUTTER_GT_region(Dragged, Gizmo):
             try:
                 motion_keys.insert(effect, index)
             except EffectError as error:  # gizmos have no reports
-                popup(context, str(error), icon="ERROR")
+                render_job.popup(str(error), icon="ERROR")
             context.area.tag_redraw()  # panels show whether it is keyed
         bpy.ops.ed.undo_push(message=iface_("Transform Region", contexts.operator_default))
 

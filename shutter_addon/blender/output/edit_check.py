@@ -45,7 +45,7 @@ def effects(scene: Scene, frames: range) -> tuple[list[str], list[str], set[Path
 
 def _shown_effects(film: Scene, frames: range) -> Iterator[tuple]:
     """Yield (scene, effect, strip, frames) of every effect that is shown at one of the film's frames."""
-    wanted = dict(requirements.scenes_at(film, frames))
+    wanted = requirements.shown_scenes(film, frames)
     for scene, effect, parts in job_snapshots.shown_effects(film):
         shown: set[float] = set()
         for part in parts if scene in wanted else ():

@@ -83,8 +83,7 @@ def _edit(scene: Scene | None) -> Iterator[str]:
     size = f"{render.resolution_x}×{render.resolution_y} at {render.resolution_percentage} %"
     yield f"- Frames: {scene.frame_start} to {scene.frame_end}, at {scene.frame_current}; {size}"
     yield f"- Saved by Blender {version}; output {render.image_settings.file_format}"
-    all_strips = scene.sequence_editor.strips_all if scene.sequence_editor else ()
-    counts = Counter(strip.type for strip in all_strips)
+    counts = Counter(strip.type for strip in strips.all_strips(scene))
     yield f"- Strips: {', '.join(f'{count} {kind}' for kind, count in sorted(counts.items())) or 'none'}"
     for effect, strip, _source in strips.shown_effects(scene):
         yield from _effect(scene, effect, strip)

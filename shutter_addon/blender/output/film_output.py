@@ -14,7 +14,7 @@ from bpy.types import ImageFormatSettings, RenderSettings, Scene
 from ...core import atomic_write
 from ...core.messages import UserError, of_file
 from ...media.rendered_pictures import is_whole_movie, is_whole_picture, whole_pictures, why_short
-from ..data import strips
+from ..data import requirements, strips
 from ..data.property_copy import for_a_while
 from ..rendering import render_job
 
@@ -151,7 +151,7 @@ def set_output(scene: Scene, path: Path, file_format: str, *, alpha: bool) -> No
         settings.media_type = "VIDEO"
         settings.color_mode = "RGB"
         render.ffmpeg.format, render.ffmpeg.codec = container, codec
-        shown_strips = (strip for shown in strips.shown_scenes(scene) for strip in strips.all_strips(shown))
+        shown_strips = (strip for shown in requirements.shown_scenes(scene) for strip in strips.all_strips(shown))
         render.ffmpeg.audio_codec = audio if any(strip.type == "SOUND" for strip in shown_strips) else "NONE"
         render.ffmpeg.constant_rate_factor = "HIGH"
         return
@@ -226,8 +226,7 @@ def render_frames(scene: Scene, output: Path, moved: Callable[[], None], move: M
         place = blender_path(str(part_film) if is_film else f"{part}{os.sep}")
         try:
             with (
-                for_a_while([(scene.render, "filepath", place)]),
-                render_job.telling(faults.append),
+                for_a_while([(scene.render, "filepath", place), (render_job.job, "tell", faults.append)]),
                 stoppable() as stopped,
                 quiet(),
                 # Each frame is rendered once, and caches would take gigabytes.

@@ -64,14 +64,12 @@ def render(scene: Scene, folder: Path, file_format: str, version: EditVersion, *
     with film_output.progress(len(pictures), "frame") as moved:
         write = partial(film_output.render_frames, scene, folder, moved, move)
         if resume:
-            _render_missing(scene, folder, pictures, version.key, write, moved)
+            _resume(scene, folder, pictures, version.key, write, moved)
         else:
             write()
 
 
-def _render_missing(
-    scene: Scene, folder: Path, missing: dict[int, Path], key: str, write: Callable, moved: Callable
-) -> None:
+def _resume(scene: Scene, folder: Path, missing: dict[int, Path], key: str, write: Callable, moved: Callable) -> None:
     waits = False
     with Claims(folder) as claims, film_output.stoppable() as stopped:
         while missing:
@@ -102,11 +100,11 @@ def _claim_run(claims: Claims, missing: dict[int, Path], key: str, moved: Callab
     for frame, picture in list(missing.items()):
         if len(run) == RUN or (run and frame - 1 != run[-1]):
             break
-        if _is_finished(picture, key):
+        if rendered_pictures.read(picture, key) is not None:
             del missing[frame]
             moved()
         elif claims.take(_name(picture)):
-            if not _is_finished(picture, key):  # since the last look
+            if rendered_pictures.read(picture, key) is None:  # nobody has rendered it since the last look
                 run.append(frame)
                 continue
             claims.release(_name(picture))
@@ -118,8 +116,3 @@ def _claim_run(claims: Claims, missing: dict[int, Path], key: str, moved: Callab
 def _name(picture: Path) -> str:
     """Return the name of a picture's claim."""
     return f"{picture.stem}_{picture.suffix[1:]}"
-
-
-def _is_finished(picture: Path, key: str) -> bool:
-    """Return whether a picture is undamaged and of this version of the edit."""
-    return rendered_pictures.read(picture, key) is not None

@@ -49,8 +49,7 @@ def _part_at(parts: list[tuple[range, Snapshot]], scene_frame: float) -> Snapsho
 
 def end() -> None:
     """Forget all snapshots, after a job or a film."""
-    for known in (job.film_data.taken, job.film_data.read, job.film_data.pictures, job.film_data.left_out):
-        known.clear()
+    job.film_data = render_job.FilmData(feed=job.film_data.feed)
     sessions.end_job()
 
 
@@ -118,7 +117,7 @@ def _late(uid: int, scene_frame: float) -> Snapshot:
 
 def shown_effects(film: Scene) -> Iterator[tuple[Scene, PropertyGroup, list[Strip]]]:
     """Yield the effects that a film's scene and the scenes in its Scene strips show: scene, effect, effect strips."""
-    for scene in strips.shown_scenes(film):
+    for scene in requirements.shown_scenes(film):
         shown = strips.effect_strips(scene)
         for effect in scene.virtual_shutter.effects:
             if parts := [strip for strip in shown if strip.scene == effect.scene]:

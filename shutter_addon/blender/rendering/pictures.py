@@ -39,7 +39,7 @@ def picture(context: RenderContext, snapshot: Snapshot, frame: float, detail: De
     stopping.check()
     session, request = context.session, context.request(snapshot, frame, detail)
     renderer = context.renderer(request)  # opened again, if the window has closed it meanwhile
-    if (weights := render_job.job.settings.weights) is not None:
+    if (weights := render_job.job.weights) is not None:
         place = weights / f"{round(frame - snapshot.first + 1):04d}.exr"
         _write_weights(place, snapshot, frame, session.run(_weights, renderer, request))
     if renderer.source.by_blender:
@@ -113,7 +113,6 @@ def resized(picture: np.ndarray, width: int, height: int, divisor: int = 1) -> n
         picture = picture.repeat(divisor, axis=0).repeat(divisor, axis=1)[:height, :width]
     if picture.shape[:2] == (height, width):
         return picture
-    small = OpenImageIO.ImageBufAlgo.resize(
-        OpenImageIO.ImageBuf(np.ascontiguousarray(picture)), roi=OpenImageIO.ROI(0, width, 0, height)
-    )
+    whole = OpenImageIO.ImageBuf(np.ascontiguousarray(picture))
+    small = OpenImageIO.ImageBufAlgo.resize(whole, roi=OpenImageIO.ROI(0, width, 0, height))
     return np.asarray(small.get_pixels(OpenImageIO.FLOAT)).reshape(height, width, 4)

@@ -22,7 +22,6 @@ from ..data import annotations, preview_areas, selection, strips
 from ..data.preview_areas import Look, Shown
 from ..data.snapshot import Snapshot
 from . import effect_source, invalidation, render_job, sessions
-from .session import RenderContext
 
 # Operators that read the sequencer's pictures from the window.
 _READERS = {"RENDER_OT_opengl", "SEQUENCER_OT_sample"}
@@ -149,7 +148,7 @@ def for_engine(context: Context, effect_scene: Scene) -> Decision | None:
         is_told = context.window_manager.virtual_shutter.live and not decision.is_drawn
         return replace(decision, stopped=_time_up(context, decision.request.key) if is_told else None)
     detail = effect_source.FULL if look is None or looking.whole is not None else _detail(context, look)
-    return Decision(snapshot, frame, _best(context, sessions.of_drawing(), snapshot, frame, detail))
+    return Decision(snapshot, frame, _best(context, snapshot, frame, detail))
 
 
 def take_decision() -> Decision | None:
@@ -194,10 +193,10 @@ def _look(context: Context, shown: Shown) -> Look:
 
 
 def _decide(context: Context, shown: Shown, look: Look, snapshot: Snapshot) -> Decision:
-    render = sessions.of_drawing()
-    request = _requested(context, render, shown, snapshot, look)
+    request = _requested(context, shown, snapshot, look)
     is_plain = any(comes(snapshot.scene) for comes in features.each("smooth_comes"))
-    is_drawn = _is_drawn(context, shown, look, render.renderer(request).source, is_less=is_plain or is_going(context))
+    source = sessions.of_drawing().renderer(request).source
+    is_drawn = _is_drawn(context, shown, look, source, is_less=is_plain or is_going(context))
     return Decision(snapshot, shown.scene.frame_current, request, is_drawn, is_plain)
 
 
@@ -205,7 +204,7 @@ def _snapshot(shown: Shown) -> Snapshot:
     return invalidation.current(shown.scene, shown.effect, shown.strip, shown.scene.frame_current)
 
 
-def _requested(context: Context, render: RenderContext, shown: Shown, snapshot: Snapshot, look: Look) -> Request:
+def _requested(context: Context, shown: Shown, snapshot: Snapshot, look: Look) -> Request:
     """Return the picture in the previews' detail, or in full while it is looked at so.
 
     Another frame or a change of the effect ends full quality.
@@ -213,18 +212,17 @@ def _requested(context: Context, render: RenderContext, shown: Shown, snapshot: 
     frame = shown.scene.frame_current
     whole = looking.whole
     if whole and (whole.scene, whole.frame) == (snapshot.scene, frame) and not is_going(context):
-        plain = render.request(snapshot, frame, replace(effect_source.FULL, smooth=False))
+        plain = sessions.of_drawing().request(snapshot, frame, replace(effect_source.FULL, smooth=False))
         if whole.key in (None, plain.key[1:]):
             whole.key = plain.key[1:]
-            return _best(context, render, snapshot, frame, effect_source.FULL)
+            return _best(context, snapshot, frame, effect_source.FULL)
     looking.whole = None
-    return _best(context, render, snapshot, frame, _detail(context, look))
+    return _best(context, snapshot, frame, _detail(context, look))
 
 
-def _best(
-    context: Context, render: RenderContext, snapshot: Snapshot, frame: float, detail: effect_source.Detail
-) -> Request:
+def _best(context: Context, snapshot: Snapshot, frame: float, detail: effect_source.Detail) -> Request:
     """Return the picture in a detail, or the plain one where the smooth one is not ready."""
+    render = sessions.of_drawing()
     if not is_read(context) and detail.smooth:
         for smooth_request in features.each("smooth_request"):
             return smooth_request(render, snapshot, frame, detail)
@@ -255,14 +253,8 @@ def _is_drawn(context: Context, shown: Shown, look: Look, source: FrameSource, *
     """
     settings = context.window_manager.virtual_shutter
     is_small = source.from_proxy or source.width < annotations.picture_size(shown.effect)[0]
-    return (
-        settings.live
-        and (is_small or is_less or settings.view not in RESULTS)
-        and not shown.strips_above
-        and source.alpha == "opaque"
-        and look.is_plain
-        and not pen_is_down()
-    )
+    is_wanted = settings.live and (is_small or is_less or settings.view not in RESULTS)
+    return is_wanted and not shown.strips_above and source.alpha == "opaque" and look.is_plain and not pen_is_down()
 
 
 def _drafted(context: Context, shown: Shown, request: Request) -> Request:

@@ -12,7 +12,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, wait
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import partial
@@ -28,7 +28,6 @@ from bpy.types import Scene
 from ...core import threads
 from ...core.messages import sentence, signed
 from ...devices.device import Budget
-from ..data.property_copy import for_a_while
 from ..data.snapshot import Snapshot
 from ..data.strips import ENGINE
 from ..devices import main_thread
@@ -60,24 +59,7 @@ class Where(Enum):
 
 
 @dataclass
-class _RenderSettings:
-    """What a command sets for its render.
-
-    Attributes:
-        device: One of available.CHOICES.
-        weights: Folder for the coefficients of every picture, as EXR files.
-        gpu_memory: Megabytes of the GPU that textures may take; 0: as device.allowed.
-        budget: With the megabytes that it was made for.
-    """
-
-    device: str | None = None
-    weights: Path | None = None
-    gpu_memory: int | None = None
-    budget: tuple[int, Budget] | None = None
-
-
-@dataclass
-class _FilmData:
+class FilmData:
     """What is known of the running job or film, by session_uid of effect scenes.
 
     Attributes:
@@ -109,8 +91,11 @@ class _Job:
         waited_for: Whether the window waits for every picture (Where.WAITED_FOR).
         spent: Names of scenes and cameras of small renders (_cancel).
         said: Sentences that were said once (say_once).
-        settings: Of the running command; empty in the window.
         film_data: What is known of the running job or film.
+        device: One of available.CHOICES, of a command.
+        weights: Folder for the coefficients of every picture, as EXR files, of a command.
+        gpu_memory: Megabytes of the GPU that textures may take, of a command; 0: as device.allowed.
+        budget: With the megabytes that it was made for.
     """
 
     film: int | None = None
@@ -122,8 +107,11 @@ class _Job:
     waited_for: bool = False
     spent: list[tuple[str, str]] = field(default_factory=list)
     said: set[str] = field(default_factory=set)
-    settings: _RenderSettings = field(default_factory=_RenderSettings)
-    film_data: _FilmData = field(default_factory=_FilmData)
+    film_data: FilmData = field(default_factory=FilmData)
+    device: str | None = None
+    weights: Path | None = None
+    gpu_memory: int | None = None
+    budget: tuple[int, Budget] | None = None
 
 
 job = _Job()
@@ -213,11 +201,6 @@ def operators_running() -> set[str]:
     return {operator.bl_idname for window in windows for operator in window.modal_operators}
 
 
-def telling(to: Callable[[str], None]) -> AbstractContextManager[None]:
-    """Inside a `with` block, pass the sentence that ends a render in the background to a function, not to stderr."""
-    return for_a_while([(job, "tell", to)])
-
-
 @contextmanager
 def calling(handlers: list, function: Callable) -> Iterator[None]:
     """Add a function to one of bpy.app.handlers inside a `with` block."""
@@ -296,11 +279,14 @@ def _cancel_and_show() -> None:
     """Cancel, and show the failure in the window, where reports of an engine in the sequencer do not arrive."""
     _cancel()
     if job.failure is not None:
-        text = sentence(job.failure)
-        with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
-            bpy.context.window_manager.popup_menu(
-                lambda menu, _context: menu.layout.label(text=text), title="Virtual Shutter", icon="ERROR"
-            )
+        popup(sentence(job.failure), title="Virtual Shutter", icon="ERROR")
+
+
+def popup(words: str, **looks: str) -> None:
+    """Show a translated sentence in a popup at the pointer."""
+    manager = bpy.context.window_manager
+    with bpy.context.temp_override(window=bpy.context.window or manager.windows[0]):
+        manager.popup_menu(lambda menu, _context: menu.layout.label(text=words, translate=False), **looks)
 
 
 def _cancel() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager
-from pathlib import Path
 
 from ...devices.device import MEGABYTE, Budget, allowed
 from ..data import preferences
@@ -12,22 +11,19 @@ from ..devices import available
 from .render_job import job
 
 
-def using(
-    device: str | None = None, weights: Path | None = None, gpu_memory: int | None = None
-) -> AbstractContextManager[None]:
-    """Give renders these settings inside a `with` block, in a command."""
-    changes = {"device": device, "weights": weights, "gpu_memory": gpu_memory}
-    return for_a_while((job.settings, name, value) for name, value in changes.items())
+def using(**settings: object) -> AbstractContextManager[None]:
+    """Give renders these settings of a command inside a `with` block."""
+    return for_a_while((job, name, value) for name, value in settings.items())
 
 
 def wanted() -> str:
     """Return the device that the command or the user wants, one of available.CHOICES."""
-    return job.settings.device or preferences.device()
+    return job.device or preferences.device()
 
 
 def _wanted_memory() -> int:
     """Return the megabytes that the command or the user sets; 0: as many as allowed."""
-    return preferences.gpu_memory() if job.settings.gpu_memory is None else job.settings.gpu_memory
+    return preferences.gpu_memory() if job.gpu_memory is None else job.gpu_memory
 
 
 def memory() -> Budget:
@@ -35,16 +31,16 @@ def memory() -> Budget:
 
     OpenGL knows the size best, where it may be asked.
     """
-    if job.settings.budget is None:
+    if job.budget is None:
         megabytes = _wanted_memory()
         known = available.opengl().memory if not megabytes and wanted() in ("auto", "gpu", "opengl") else None
-        job.settings.budget = megabytes, Budget(megabytes * MEGABYTE or known or allowed(None))
-    return job.settings.budget[1]
+        job.budget = megabytes, Budget(megabytes * MEGABYTE or known or allowed(None))
+    return job.budget[1]
 
 
 def forget_memory_if_changed() -> bool:
     """Forget the budget if another limit is wanted now. Return whether it was."""
-    if job.settings.budget is None or job.settings.budget[0] == _wanted_memory():
+    if job.budget is None or job.budget[0] == _wanted_memory():
         return False
-    job.settings.budget = None
+    job.budget = None
     return True

@@ -29,6 +29,8 @@ from .effect_source import FAULTS, FULL, Detail, SourceKey, clip_of
 from .render_job import Where, where
 
 T = TypeVar("T")
+Say = Callable[[str], None]  # takes a sentence for the user
+Chosen = tuple[str, str | None]  # a device, a key of available.OPEN, and why it is a lesser one
 _PATIENCE = 0.1  # seconds between two looks at whether a picture is still wanted
 _KEPT = 4  # effects whose frames are kept; with more in one frame, each frame decodes all windows again
 Place = tuple[int, bool]  # SourceKey.place
@@ -91,7 +93,7 @@ class RenderContext:
     """
 
     session: RenderSession
-    say: Callable[[str], None] = print
+    say: Say = print
     levels: bool = False
     display: Display | None = None
 
@@ -113,11 +115,9 @@ class RenderContext:
             if (request.source, request.levels, request.display) == (key, self.levels, self.display):
                 return request
         with translated(rpt_):
-            index, state, direction = state_at(snapshot.effect, clip_of(snapshot, source), frame)
+            index, state, way = state_at(snapshot.effect, clip_of(snapshot, source), frame)
         state = state.in_blocks(max(state.options.aggregate // key.detail.divisor, 1))
-        request = Request(
-            index=index, state=state, direction=direction, source=key, levels=self.levels, display=self.display
-        )
+        request = Request(index=index, state=state, direction=way, source=key, levels=self.levels, display=self.display)
         session.requests[key.place] = snapshot, frame, request
         return request
 
@@ -129,9 +129,7 @@ class RenderContext:
 class RenderSession:
     """A compositor, opened when it is first used, and the renderers of the effects that were shown last."""
 
-    def __init__(
-        self, choose: Callable[[], tuple[str, str | None]], ask_others: Callable[[], None], late: Late | None = None
-    ) -> None:
+    def __init__(self, choose: Callable[[], Chosen], ask_others: Callable[[], None], late: Late | None = None) -> None:
         """Make a session.
 
         Args:
@@ -141,7 +139,7 @@ class RenderSession:
         """
         self._choose, self._ask_others, self._late = choose, ask_others, late
         self._frees_others = False  # whether others free memory, in the middle of a picture
-        self._chosen: tuple[str, str | None] | None = None
+        self._chosen: Chosen | None = None
         self._executor: Executor = threads.pool(1)
         self._compositor: Future | None = None
         self._renderers: dict[Place, tuple[SourceKey, Renderer]] = {}
@@ -171,8 +169,7 @@ class RenderSession:
         ended = threading.Event()
         if self.threaded:
             with suppress(RuntimeError):  # at Python's exit, threads take no more work
-                future = self._executor.submit(broken_off, ended.is_set, function, *arguments)
-                return Work(future, ended)
+                return Work(self._executor.submit(broken_off, ended.is_set, function, *arguments), ended)
         done: Future = Future()
         done.set_result(function(*arguments))
         return Work(done, ended)
@@ -207,7 +204,7 @@ class RenderSession:
         known = self._renderers.get((scene, False)) or self._renderers.get((scene, True))
         return known[0].detail if known else FULL
 
-    def renderer(self, key: SourceKey, say: Callable[[str], None] = print) -> Renderer:
+    def renderer(self, key: SourceKey, say: Say = print) -> Renderer:
         """Return the renderer of a key. An effect keeps at most two, for plain and smooth pictures.
 
         Raises:
@@ -231,7 +228,7 @@ class RenderSession:
         known = self._renderers.get(key.place)
         return known[1] if known and known[0] == key else None
 
-    def _opened(self, say: Callable[[str], None]) -> Any:
+    def _opened(self, say: Say) -> Any:
         """Return the compositor, opened if necessary."""
         if self._compositor is None:
             with stopping.once(stopping.never):

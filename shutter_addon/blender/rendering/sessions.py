@@ -5,7 +5,6 @@ The engine, the draw handler, commands and the feed of a film get a RenderContex
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
@@ -16,7 +15,7 @@ from ...core.pixels.shown_levels import Display
 from ..devices import available, main_thread
 from . import render_job, render_settings
 from .render_job import Where
-from .session import RenderContext, RenderSession
+from .session import RenderContext, RenderSession, Say
 
 _ANSWER = 5.0  # seconds that a job waits for the window to free memory
 
@@ -62,14 +61,12 @@ def of_drawing() -> RenderContext:
     return RenderContext(SESSIONS.window) if render_job.where() is Where.WINDOW else of_render()
 
 
-def of_engine(say: Callable[[str], None]) -> RenderContext:
+def of_engine(say: Say) -> RenderContext:
     """Return the context of the engine: a preview where Blender draws, else a render."""
     return of_render(say) if render_job.ends_films() else RenderContext(SESSIONS.window, say)
 
 
-def of_render(
-    say: Callable[[str], None] = print, *, levels: bool = False, display: Display | None = None
-) -> RenderContext:
+def of_render(say: Say = print, *, levels: bool = False, display: Display | None = None) -> RenderContext:
     """Return the context of a render, on a device that needs no window. NoDeviceError: there is none."""
     session = SESSIONS.offscreen
     if render_job.where() is Where.WAITED_FOR:

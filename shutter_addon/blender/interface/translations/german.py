@@ -107,20 +107,8 @@ MESSAGES = {
     ): "„{scene}“ wurde von einer neueren Version von Virtual Shutter gespeichert ({version}): Was diese nicht kennt, "
     "bleibt erhalten, wird aber nicht gezeigt, und kein Effekt dieser Datei folgt Streifen, die verschoben, kopiert "
     "oder gelöscht werden",
-    (
-        "*",
-        'Saved "{path}" without data of a newer version of Virtual Shutter',
-    ): "„{path}“ gespeichert, ohne das, was eine neuere Version von Virtual Shutter hinzugefügt hat",
     ("*", "{place}: {property} is none of its choices"): "{place}: {property} ist keine der Möglichkeiten",
     ("*", "{place}: {count} bars, and {window} frames"): "{place}: {count} Balken und {window} Bilder",
-    (
-        "*",
-        "{place}: {count} shutters, but at most {most} are possible",
-    ): "{place}: {count} Verschlüsse, höchstens {most} sind möglich",
-    (
-        "*",
-        "{place}: {count} regions, but at most {most} are possible",
-    ): "{place}: {count} Regionen, höchstens {most} sind möglich",
     ("*", "An effect can have at most {most} shutters"): "Ein Effekt hat höchstens {most} Verschlüsse",
     ("*", "An effect can have at most {most} regions"): "Ein Effekt hat höchstens {most} Regionen",
     (
@@ -302,7 +290,7 @@ MESSAGES = {
     ("*", "Bar"): "Balken",
     ("*", "Number of the bar, from 1"): "Nummer des Balkens, ab 1",
     ("*", "Weight"): "Gewicht",
-    ("*", "Contribution of the bar's frame"): "Wie viel das Bild des Balkens beiträgt",
+    ("*", "Contribution of its frame"): "Wie viel sein Bild beiträgt",
     ("*", "The shutter has {count} bars"): "Der Verschluss hat {count} Balken",
     ("Operator", "Paint Bars"): "Balken malen",
     # Regions
@@ -367,7 +355,6 @@ MESSAGES = {
         "*",
         "Erase strokes of the active region in the preview",
     ): "Striche der aktiven Region in der Vorschau ausradieren",
-    ("*", "Open a sequencer with a preview to erase"): "Zum Radieren einen Sequenzer mit Vorschau öffnen",
     ("Operator", "Assign Region to Shutter"): "Region einem Verschluss zuweisen",
     ("*", "Assign the active region to another shutter"): "Die aktive Region einem anderen Verschluss zuweisen",
     ("Operator", "Remove Region"): "Region entfernen",
@@ -530,15 +517,12 @@ MESSAGES = {
     ("*", "Width"): "Breite",
     ("*", "Width of the lines as a fraction of the picture's height"): "Breite der Linien als Bruchteil der Bildhöhe",
     ("*", "Location"): "Position",
-    (
-        "*",
-        "Distance from where the region was drawn, as a fraction of the picture",
-    ): "Abstand vom Ort, an dem die Region gezeichnet wurde, als Bruchteil des Bildes",
+    ("*", "In fractions of the picture"): "Als Bruchteil des Bildes",
     ("*", "Rotation"): "Rotation",
-    ("*", "Rotation about the region's center"): "Rotation um die Mitte der Region",
+    ("*", "Rotation about the center"): "Rotation um die Mitte",
     ("Operator", "Transform Region"): "Region transformieren",
     ("*", "Scale"): "Skalieren",
-    ("*", "Scale about the region's center"): "Skalierung um die Mitte der Region",
+    ("*", "Scale about the center"): "Skalierung um die Mitte",
     # Mattes and ramps
     ("Operator", "Matte from File"): "Matte aus Datei",
     (
@@ -691,7 +675,7 @@ MESSAGES = {
     ("*", "Channel Name"): "Kanalname",
     (
         "*",
-        "Name of a channel of an EXR file; empty for the luminance",
+        "Channel of an EXR file; empty: luminance",
     ): "Name eines Kanals einer EXR-Datei; leer für die Leuchtdichte",
     ("*", "Name of the channel in the EXR file"): "Name des Kanals in der EXR-Datei",
     ("*", "Invert"): "Invertieren",
@@ -950,7 +934,7 @@ MESSAGES = {
     ("*", "Probe"): "Sonde",
     (
         "*",
-        "Show the bars of the pixel under the pointer, and its share of each shutter",
+        "Show bars of the pixel under the pointer, and its share of each shutter",
     ): "Verschluss des Pixels zeigen, über dem der Zeiger zuletzt war, und wie viel er von jedem erhält",
     ("*", "Probe Position"): "Ort der Sonde",
     (
@@ -1002,11 +986,11 @@ MESSAGES = {
         "*",
         "Timeline frame at which tracking stops; 0 is the end of the strip",
     ): "Bild der Zeitleiste, bei dem das Verfolgen anhält; 0 ist das Ende des Streifens",
-    ("*", "All Keys"): "Alle Schlüsselbilder",
+    ("Virtual Shutter", "All Keys"): "Alle Schlüsselbilder",
     (
         "*",
-        "Keep a key at every tracked frame, in place of those that the motion needs within a pixel",
-    ): "Ein Schlüsselbild in jedem verfolgten Bild, statt derer, die die Bewegung auf ein Pixel genau braucht",
+        "Key every tracked frame, not only where the motion needs it",
+    ): "Jedes verfolgte Bild bekommt ein Schlüsselbild, nicht nur, wo die Bewegung es braucht",
     ("*", "Tracking: {done} of {total} frames, Esc to stop"): "Verfolgt: {done} von {total} Bildern, Esc hält an",
     (
         "*",
@@ -1023,7 +1007,7 @@ MESSAGES = {
     ): "Ab Frame {frame} bewegen sich Nah und Fern verschieden, oder es ist zu wenig zu sehen: nicht alles steht still",
     ("*", "Tracking stopped at frame {frame}: {fault}"): "Das Verfolgen hielt bei Bild {frame} an: {fault}",
     ("*", "Confidence"): "Sicherheit",
-    ("*", "How certain the tracked position is"): "Wie sicher das Verfolgen war, wo es ist",
+    ("*", "How certain the position is"): "Wie sicher das Verfolgen war, wo es ist",
     ("*", "Confidence: {percent} %"): "Sicherheit: {percent} %",
     ("Operator", "Next Unsure Frame"): "Nächstes unsicheres Bild",
     ("Operator", "Next Unsure Camera Frame"): "Nächstes unsicheres Bild der Kamera",
@@ -1047,12 +1031,8 @@ MESSAGES = {
     ): "das aktuelle Bild liegt außerhalb des Verschlussstreifens",
     (
         "*",
-        '{place}: the F-curve of "{channel}" is locked',
-    ): "{place}: die F-Kurve von „{channel}“ ist gesperrt",
-    (
-        "*",
-        '{place}: the F-curve of "{channel}" is muted',
-    ): "{place}: die F-Kurve von „{channel}“ ist stummgeschaltet",
+        '{place}: the F-curve of "{channel}" is locked or muted',
+    ): "{place}: die F-Kurve von „{channel}“ ist gesperrt oder stummgeschaltet",
     ("*", "the shot ends here"): "die Einstellung endet hier",
     (
         "*",
@@ -1073,13 +1053,11 @@ MESSAGES = {
         "*",
         "the picture is too unlike those before; tracking goes on from here",
     ): "das Bild ist denen davor zu unähnlich; von hier aus geht die Verfolgung weiter",
-    ("*", "Fade Out When Lost"): "Ausblenden, wenn verloren",
+    ("Virtual Shutter", "Fade Out When Lost"): "Ausblenden, wenn verloren",
     (
         "*",
-        "Track keys a region's opacity, or the camera's influence, so that it fades where the track ends; "
-        "a region ends with its shot",
-    ): "Verfolgen gibt der Deckkraft einer Region, oder dem Einfluss der Kamera, Schlüsselbilder: Sie klingt aus, "
-    "wo die Verfolgung endet; eine Region endet mit ihrer Einstellung",
+        "Fade a region or the camera out where the track ends",
+    ): "Eine Region oder die Kamera ausblenden, wo die Verfolgung endet",
     ("*", "Part of the motion that the exposure follows"): "Was von der Bewegung gilt",
     ("*", "Smoothness"): "Glätte",
     (
@@ -1167,18 +1145,6 @@ MESSAGES = {
     ): "Wie weit sich bei offenem Verschluss bewegt, was verfolgt wird, als Bruchteil der Bildhöhe",
     (
         "*",
-        "Movement of what the camera sees, as a fraction of the picture",
-    ): "Wohin sich bewegt hat, was die Kamera sieht, als Bruchteil des Bildes",
-    (
-        "*",
-        "Rotation of what the camera sees, about the picture's center",
-    ): "Drehung dessen, was die Kamera sieht, um die Bildmitte",
-    (
-        "*",
-        "Scale of what the camera sees, about the picture's center",
-    ): "Skalierung dessen, was die Kamera sieht, um die Bildmitte",
-    (
-        "*",
         '{place}: there is no region "{region}" to follow',
     ): "{place}: Es gibt keine Region „{region}“, der zu folgen wäre",
     ("*", "Exposure Moves With"): "Belichtung bewegt sich mit",
@@ -1201,11 +1167,11 @@ MESSAGES = {
     ("*", "Clip"): "Clip",
     (
         "*",
-        "Movie clip of the source's footage, in which something is tracked",
-    ): "Filmclip vom Material der Quelle, in dem etwas verfolgt ist",
+        "Movie clip that has the track",
+    ): "Filmclip mit der Spur",
     (
         "*",
-        "Tracking object that has the tracks; without one, the camera",
+        "Tracking object that has the tracks; empty: the camera",
     ): "Verfolgungsobjekt mit den Spuren; ohne eines die Kamera",
     (
         "*",
@@ -1237,8 +1203,8 @@ MESSAGES = {
     ): "Verschlüsse, Regionen, Keyframes und Optionen des Effekts für andere Strips und Szenen dieser Datei kopieren",
     (
         "*",
-        "Copied without data of a newer version of Virtual Shutter",
-    ): "Kopiert, ohne das, was eine neuere Version von Virtual Shutter hinzugefügt hat",
+        "Data of a newer version of Virtual Shutter is left out",
+    ): "Es fehlt, was eine neuere Version von Virtual Shutter hinzugefügt hat",
     ("Operator", "Paste Effect"): "Effekt einfügen",
     (
         "*",
@@ -1261,8 +1227,8 @@ MESSAGES = {
     ("*", "Custom Time"): "Eigene Zeit",
     (
         "*",
-        "Show the source at the time that is set here, in place of the strip's own timing",
-    ): "Die Quelle zu der Zeit zeigen, die hier eingestellt ist, anstelle der Zeit des Streifens",
+        "Show the source at the time set here",
+    ): "Die Quelle zu der Zeit zeigen, die hier eingestellt ist",
     ("*", "Source Time"): "Quellzeit",
     (
         "*",

@@ -18,9 +18,9 @@ from ....blender.data.annotations import layer_of
 from ....blender.editing import region_edits
 from ....blender.interface import drawing, needs
 from ....blender.interface.gizmo_groups import Dragged, View, WithKeys, view
-from ....blender.interface.operator_bases import Beside, OfEffect, operator, popup, redraw, report, show_status
+from ....blender.interface.operator_bases import Beside, OfEffect, operator, redraw, report, show_status
 from ....blender.interface.region_gizmo import SHUTTER_GGT_region
-from ....blender.rendering import effect_source, previews
+from ....blender.rendering import effect_source, previews, render_job
 from ....blender.rendering.effect_source import FAULTS
 from ....core import revision
 from ....core.messages import EffectError, UserError
@@ -274,7 +274,7 @@ def after_stroke(context: Context, scene: Scene, effect: PropertyGroup, strip: S
     try:
         is_found = find_subject(scene, effect, strip, effect.active_region)
     except (*FAULTS, UserError) as error:
-        popup(context, str(error), icon="ERROR")
+        render_job.popup(str(error), icon="ERROR")
         return
     if is_found:
         bpy.ops.ed.undo_push(message=iface_("Find Subject", contexts.operator_default))

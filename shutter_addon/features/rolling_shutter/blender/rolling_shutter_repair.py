@@ -19,7 +19,7 @@ from bpy.types import Context, Operator, PropertyGroup, Scene, Strip
 from ....blender.data import snapshot, source_media, strips, validation
 from ....blender.data.consistency import bars
 from ....blender.data.sampled import Sampling
-from ....blender.editing import bar_edits, region_edits, shutter_edits
+from ....blender.editing import bar_edits, shutter_edits
 from ....blender.interface.operator_bases import operator
 from ....core.messages import EffectError
 from ....core.model.choices import CONTEXT, READS, SIDES
@@ -93,7 +93,7 @@ def repair(scene: Scene, effect: PropertyGroup, strip: Strip, share: float, side
     else:
         backward = source_media.timing_of(strips.source_of(scene, effect, strip)).use_reverse_frames
     known = of(effect)
-    if known is None and (sentence := region_edits.why_full(effect, regions=1, shutters=2)):
+    if known is None and (sentence := validation.why_full(effect, regions=1, shutters=2)):
         raise EffectError(sentence)
     opencv.check("moments between frames need")
     effect.window = max(validation.number(effect, "window"), FRAMES)
@@ -122,7 +122,7 @@ def _why_no_repair(effect: PropertyGroup) -> str | None:
         has_repair = of(effect) is not None
     except EffectError as error:
         return str(error)
-    return None if has_repair else region_edits.why_full(effect, regions=1, shutters=2)
+    return None if has_repair else validation.why_full(effect, regions=1, shutters=2)
 
 
 _SIDE = EnumProperty(
