@@ -40,7 +40,6 @@ def test_mattes_and_ramps():
     regions += [RAMP | {"ramp": "luminance"}]
     parsed = recipe_file.parse(json.dumps(EXAMPLE | {"regions": regions}))
     assert comes_back(parsed)
-    assert recipe.contents(recipe.moved(parsed, Path("a/b"), Path("a")))[0].path == "b/mattes/0001.png"
     moment = with_contents(parsed.for_picture(1), lambda region: type(region.content).__name__).at(3)
     assert len(moment.shapes) == 1
     of_source, of_timeline, ramp, luminance = moment.mattes
