@@ -4,7 +4,6 @@ import pytest
 
 from shutter_addon.core.model import keyframes, presence
 from shutter_addon.core.model.presence import Gap, Key, Stop
-from shutter_addon.core.recipes import region_keys
 
 COVERED, BEHIND = Stop(50, True), Stop(9, False)
 TRACKED = range(10, 50)
@@ -55,10 +54,3 @@ def test_a_jump_from_which_it_goes_on_is_one_frame_long():
     found = counts(range(60), [Stop(30, True)], [0], fade=10)
     assert found[20:41] == pytest.approx([abs(frame - 30) / 10 for frame in range(20, 41)])
     assert presence.gaps(range(60), [Stop(frame, True) for frame in (30, 32, 33)]) == [Gap(30, 30), Gap(32, 33)]
-
-
-def test_keys_before_and_after_the_tracked_frames_stay():
-    value = keyframes.Keys((1, 20), (0.0, 19.0), ("linear",) * 2)
-    found = region_keys.with_ends(value, [Key(10, 1, "linear"), Key(12, 0, "constant")], range(10, 13))
-    assert found.frames == (1, 9, 10, 12, 13, 20)
-    assert found.values == pytest.approx((0, 8, 19, 0, 12, 19))
