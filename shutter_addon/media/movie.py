@@ -29,6 +29,8 @@ from .reduced import reduced, reduced_size
 SCALER = Interpolation.POINT | Interpolation.ACCURATE_RND | Interpolation.FULL_CHR_H_INT
 REDUCER = Interpolation.AREA | Interpolation.ACCURATE_RND | Interpolation.FULL_CHR_H_INT  # for smaller frames
 _NO_COUNT = 1 << 31  # Blender cannot count so many frames; a header that claims them is damaged
+# Whether frames have the position of chroma: since PyAV 19. Another extension may bring an older one.
+_TELLS_CHROMA = hasattr(av.VideoFrame, "chroma_location")
 _UNSPECIFIED = 2  # in ITU-T H.273
 # Formats whose fields Blender interpolates. It blurs all others.
 _WITH_FIELDS = frozenset({"yuv420p", "yuvj420p", "yuv422p", "yuvj422p", "yuv444p", "yuv411p", "gray"})
@@ -125,7 +127,8 @@ class MovieSource(FrameSource):
             frame.colorspace, frame.color_range = self._space, self._range
         # Colors are converted later. As in Blender, libswscale assumes the default position of chroma.
         frame.color_primaries = frame.color_trc = _UNSPECIFIED
-        frame.chroma_location = 0
+        if _TELLS_CHROMA:
+            frame.chroma_location = 0
         return frame
 
     @contextmanager
@@ -163,7 +166,7 @@ class MovieSource(FrameSource):
             return self._reformatted(self._to_packed, frame, pix_fmt).to_ndarray()
 
     def _reformatted(self, by: VideoReformatter, frame: av.VideoFrame, pix_fmt: str) -> av.VideoFrame:
-        if frame.interlaced_frame:  # libswscale would scale each field by itself
+        if frame.interlaced_frame or not _TELLS_CHROMA:  # libswscale would scale each field by itself
             frame = _untold(frame)
         samples = ColorRange.JPEG if frame.format.is_rgb else frame.color_range
         width, height = self._size
@@ -180,7 +183,7 @@ class MovieSource(FrameSource):
 
 
 def _untold(frame: av.VideoFrame) -> av.VideoFrame:
-    """Return a copy of a frame without marks for fields, which PyAV cannot clear."""
+    """Return a copy of a frame without marks for fields and for the position of chroma, which PyAV cannot clear."""
     copy = av.VideoFrame(frame.width, frame.height, frame.format.name)
     for own, plane in zip(frame.planes, copy.planes, strict=True):
         rows = np.frombuffer(own, np.uint8)[: own.height * own.line_size].reshape(own.height, own.line_size)

@@ -3,7 +3,7 @@
 import pytest
 
 from shutter_addon.core.model import keyframes, presence
-from shutter_addon.core.model.presence import Gap, Key, Stop
+from shutter_addon.core.model.presence import Gap, Stop
 
 COVERED, BEHIND = Stop(50, True), Stop(9, False)
 TRACKED = range(10, 50)

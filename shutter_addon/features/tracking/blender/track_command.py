@@ -67,7 +67,7 @@ def run(arguments: Namespace) -> None:
             for _ in track_region.track(scene, effect, strip, index, frames):
                 moved()
     except EffectError as error:
-        raise EffectError(f"{subject}: {error}") from None
+        raise film_output.OutputError(f"{subject}: {error}") from None
     stops = sorted((round(effect.start + stop.frame), stop.fault) for stop in moving.stops)
     sure = zip(*(each.tolist() for each in keys.confidence()), strict=True)
     report = {
