@@ -73,11 +73,8 @@ def test_shutters_may_follow_one_region_in_ways_of_their_own():
 @pytest.mark.parametrize("keys", [[], STRAIGHT[:1], [key(0, scale=0), key(9, (1, 1))]])
 def test_what_does_not_move_is_nothing_to_follow(keys):
     assert state_of(made(keys), 0, 0).key == made(keys, follow=None).for_picture(4 / 3).at(0).key
-
-
-def test_a_subject_of_no_size_later_is_a_point():
-    keys = [key(0), key(4, scale=0)]
-    assert followed(made(keys), 0, 0).at([4])[0][0, 0] == 0
+    no_size_later = [key(0), key(4, scale=0)]  # a point
+    assert followed(made(no_size_later), 0, 0).at([4])[0][0, 0] == 0
 
 
 @pytest.mark.parametrize("steps", [1, 8])

@@ -36,9 +36,7 @@ def test_limits():
     late = np.r_[np.zeros(20), np.ones(4)]
     assert with_length(late, way, 0, 0.5) == pytest.approx(4 * np.eye(WINDOW)[20])  # the nearest open one
     assert with_length(np.ones(1), np.zeros(2), 0.3, 0.5).tolist() == [1]
-
-
-def test_what_rounding_leaves_does_not_open_a_bar():
+    # What rounding leaves opens no bar.
     bars, way = np.r_[np.ones(4), np.zeros(4)], np.linspace(0, 1, 9)
     noisy = bars + np.r_[np.zeros(4), 1e-15, np.zeros(3)]
     assert with_length(noisy, way, 0.25, 0.5) == pytest.approx(with_length(bars, way, 0.25, 0.5))

@@ -61,9 +61,7 @@ def test_cuts_between_pictures_that_are_black_in_part(film, black):
     frames = np.concatenate([film[:10], film[60:70, :, ::-1]])
     frames[black] = 0
     assert found(frames) == [10]
-
-
-def test_small_frames():
+    # Small frames
     assert signature(np.zeros((4, 4, 4), np.uint8), "srgb").shape == (4, 4, 3)
     assert signature(np.zeros((2160, 16, 4), np.float16), "linear").shape == (18, 16, 3)
 
