@@ -301,13 +301,12 @@ def _carriers(side: np.ndarray) -> _Carriers:
 
     The first one has an infinite cost. It stands for none. Places count from the corner of the margin of `_carry`.
     """
-    w = side.shape[1]
     cost = np.ascontiguousarray(side[..., 2]).ravel()
     # As whole numbers, which NumPy sorts ten times as fast; costs are not negative.
     order = np.argsort(~cost.view(np.uint16), kind="stable")
-    y, x = np.divmod(order.astype(np.int32), np.int32(w))
+    row, column = np.divmod(order, side.shape[1])
     # Of pixels of half the size, whose middle lies half a pixel further.
-    places = np.stack([x, y]) + np.float32(2 + 0.5 / STEP)
+    places = np.stack([column, row]).astype(np.float32) + np.float32(2 + 0.5 / STEP)
     x, y, cost = (each.ravel()[order].astype(np.float32) for each in np.moveaxis(side, 2, 0))
     vectors = np.stack([x, y]) / np.float32(STEP)
     return np.insert(places, 0, 0, axis=1), np.insert(vectors, 0, 0, axis=1), np.insert(cost, 0, np.inf)

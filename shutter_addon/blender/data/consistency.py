@@ -76,8 +76,8 @@ def bars(shutter: PropertyGroup) -> np.ndarray:
 def fit_bars(effect: PropertyGroup) -> None:
     """Fit bars after the window's length or position has changed.
 
-    Shutters that keep to a preset get its bars. Others forget theirs; they, and keys, keep their shape and share of
-    light.
+    Shutters that keep to a preset get its bars. Others lose the preset. Their bars, at keys too, keep their shape and
+    share of light.
     """
     for index, shutter in enumerate(effect.shutters):
         shutter.preset = preset_of(effect, index)

@@ -82,7 +82,7 @@ def check_folder(path: Path, file_format: str | None) -> None:
 
 
 def check_movie(output: Path, read: list[Path]) -> None:
-    """Raise OutputError if the movie cannot be there; `read` are files that must not be overwritten."""
+    """Raise OutputError if a path has no movie's suffix, is not one for Blender, or is one of the files in `read`."""
     if not is_movie(output):
         raise OutputError(f"{output}: none of {', '.join(MOVIES)}")
     blender_path(str(output))

@@ -22,7 +22,7 @@ CAMERA = "camera"
 
 
 def contents(source: Effect) -> list[FileContent]:
-    """Return the files of the effect's mattes, as the recipe names them."""
+    """Return the contents of a recipe's mattes that are files."""
     found = [region.content for region in source.regions if isinstance(region, MatteRegion)]
     return [content for content in found if isinstance(content, FileContent)]
 

@@ -160,8 +160,9 @@ def found(network: Network, picture: np.ndarray, on: np.ndarray, off: np.ndarray
             seen = _parts_on(network.within(picture, other, QUICK), on)
             if (surer := _sure(seen, on, other)) > least * sure:
                 near = around(seen > INSIDE, ROOM)
-                share = _parts_on(network.within(picture, near), on)
-                sure = min(surer, _sure(share, on, near))
+                seen = _parts_on(network.within(picture, near), on)
+                if (surer := min(surer, _sure(seen, on, near))) > least * sure:
+                    share, sure = seen, surer
     if sure <= 0:
         return None
     return without(Found(share, np.zeros_like(share), _confidence(share, sure)), picture, on, off)
@@ -275,8 +276,10 @@ def _passing(places: carrying.Places, carried: np.ndarray, rest: np.ndarray) -> 
         carried: The subject's share, as motion has it.
         rest: How much a pixel's colors differ from those in its place before.
     """
-    apart = (places - carrying.affine(places, it) for it in (carried < INSIDE, carried >= INSIDE))
-    ground, own = (np.hypot(each[..., 0], each[..., 1]) for each in apart)
+    fits = [carrying.affine(places, it) for it in (carried < INSIDE, carried >= INSIDE)]
+    if fits[0] is places:  # too little of the ground is seen
+        return np.zeros_like(carried)
+    ground, own = (np.hypot(*np.moveaxis(places - fit, 2, 0)) for fit in fits)
     return np.clip((own - ground) / WITH - 0.5, 0, 1) * np.exp(-np.square(rest / np.float32(SAME)))
 
 

@@ -5,9 +5,10 @@ It makes an edit, tracks there as *Track* does in the window, and exports the ef
 
 import json
 from argparse import ArgumentParser, Namespace
+from collections.abc import Iterator
 from typing import Any
 
-from bpy.types import PropertyGroup, Scene
+from bpy.types import FCurve, PropertyGroup
 
 from ....blender.commands import command_line, render_command
 from ....blender.data import fcurves, selection, strips
@@ -61,20 +62,24 @@ def run(arguments: Namespace) -> None:
     moving.motion, moving.track_all_keys = arguments.motion.upper(), arguments.all_keys
     moving.track_ends = not arguments.hold
     keys = MotionKeys(effect, index, moving.motion)
-    _forget_keys(keys, frames)
+    _offer_keys(keys, frames)
+    tracked = {arguments.frame}
     try:
         with film_output.progress(len(frames), "frame") as moved:
-            for _ in track_region.track(scene, effect, strip, index, frames):
+            moved()
+            for frame in track_region.track(scene, effect, strip, index, frames):
+                tracked.add(frame)
                 moved()
     except EffectError as error:
         raise film_output.OutputError(f"{subject}: {error}") from None
+    _drop_keys_between(keys, tracked)
     stops = sorted((round(effect.start + stop.frame), stop.fault) for stop in moving.stops)
     sure = zip(*(each.tolist() for each in keys.confidence()), strict=True)
     report = {
         **({"camera": True} if arguments.camera else {"region": arguments.region}),
         "frame": arguments.frame,
         "motion": arguments.motion,
-        "frames": [{"frame": int(frame), "confidence": round(confidence, 3)} for frame, confidence in sure],
+        "frames": [{"frame": int(frame), "confidence": round(share, 3)} for frame, share in sure if frame in tracked],
         "stops": [{"frame": frame, "reason": fault} for frame, fault in stops],
     }
     _write(arguments, matte_export.recipe_for(scene, effect, strip, arguments.output), report)
@@ -92,17 +97,26 @@ def _region_index(arguments: Namespace, effect: PropertyGroup) -> int:
     return index
 
 
-def _forget_keys(keys: MotionKeys, frames: range) -> None:
-    """Remove the keys of a motion at some frames, except for a new one at the current frame, which holds its place."""
-    scene: Scene = keys.effect.id_data
-    keys.begin(scene.frame_current)
+def _curves(keys: MotionKeys) -> Iterator[FCurve]:
     path = selection.moving(keys.effect, keys.index).path_from_id()
     for name in motion_keys.CHANNELS:
-        for curve in fcurves.curves_under(scene, f"{path}.{name}"):
-            for key in list(curve.keyframe_points)[::-1]:
-                if frames[0] <= key.co[0] <= frames[-1] and key.co[0] != scene.frame_current:
-                    curve.keyframe_points.remove(key, fast=True)
-            curve.update()
+        yield from fcurves.curves_under(keys.effect.id_data, f"{path}.{name}")
+
+
+def _offer_keys(keys: MotionKeys, frames: range) -> None:
+    """Let tracking replace the keys of a motion at some frames: they count as its own."""
+    for key in (key for curve in _curves(keys) for key in curve.keyframe_points):
+        if frames[0] <= key.co[0] <= frames[-1]:
+            key.type, key.back = motion_keys.MADE, key.co[1]
+
+
+def _drop_keys_between(keys: MotionKeys, tracked: set[int]) -> None:
+    """Remove the keys of a motion between tracked frames."""
+    for curve in _curves(keys):
+        for key in list(curve.keyframe_points)[::-1]:
+            if min(tracked) < key.co[0] < max(tracked) and key.co[0] not in tracked:
+                curve.keyframe_points.remove(key, fast=True)
+        curve.update()
 
 
 def _write(arguments: Namespace, result: Effect, report: dict[str, Any]) -> None:
