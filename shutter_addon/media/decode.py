@@ -309,7 +309,7 @@ def fraction(rational: AVRational | Fraction | None) -> Fraction:
 
 
 def reason(error: Exception) -> str:
-    """Return the message of an error, of libav's or of ours, for use inside a sentence."""
+    """Return libav's message of an error, for use inside a sentence."""
     text = (getattr(error, "strerror", None) or str(error)).strip()
     return text[:1].lower() + text[1:]
 

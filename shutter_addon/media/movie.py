@@ -137,7 +137,8 @@ class MovieSource(FrameSource):
         try:
             yield
         except (av.error.FFmpegError, MediaError) as error:
-            raise MediaError(f"frame {index} of {self.path.name} cannot be decoded: {reason(error)}") from error
+            why = error if isinstance(error, MediaError) else reason(error)
+            raise MediaError(f"frame {index} of {self.path.name} cannot be decoded: {why}") from error
 
     def _matrix(self, frame: av.VideoFrame) -> Matrix | None:
         """Return the matrix from the frame's planes to RGB, or None if it needs more conversions."""

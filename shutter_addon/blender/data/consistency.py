@@ -58,8 +58,8 @@ def rename(effect: PropertyGroup, old: str, new: str) -> str:
 
 
 def refollow(effect: PropertyGroup, old: str, new: str | None) -> None:
-    """Let shutters follow a region under its new name, or nothing if it is gone, unless another has the old name."""
-    if [region.name for region in effect.regions].count(old) > (new is not None):
+    """Let shutters follow a renamed region, or nothing if it is gone. Nothing changes if another has the old name."""
+    if [region.name for region in effect.regions].count(old) > (0 if new is None else 1):
         return
     for shutter in effect.shutters:
         if shutter.follow_region == old != new:

@@ -118,7 +118,9 @@ class DrawnPlace(PropertyGroup):
 class _Moving:
     """Where a region or the camera is, and results and settings of tracking it."""
 
-    location: labelled(FloatVectorProperty, "Location", "In fractions of the picture", size=2, subtype="XYZ", **_FAR)
+    location: labelled(
+        FloatVectorProperty, "Location", "Movement, in fractions of the picture", size=2, subtype="XYZ", **_FAR
+    )
     rotation: labelled(FloatProperty, "Rotation", "Rotation about the center", subtype="ANGLE", min=-_TURN, max=_TURN)
     scale: labelled(FloatProperty, "Scale", "Scale about the center", default=1.0, min=-MAX_SCALE, max=MAX_SCALE)
     confidence: FloatProperty(
@@ -129,7 +131,10 @@ class _Moving:
     track_until: setting(IntProperty, "Until", "Timeline frame at which tracking stops; 0 is the end of the strip")
     track_all_keys: setting(BoolProperty, "All Keys", "Key every tracked frame, not only where the motion needs it")
     track_ends: setting(
-        BoolProperty, "Fade Out When Lost", "Fade a region or the camera out where the track ends", default=True
+        BoolProperty,
+        "Fade Out When Lost",
+        "Fade out a region, or the camera's influence, where the track ends",
+        default=True,
     )
 
 
@@ -190,7 +195,7 @@ def _region_selected(effect: PropertyGroup, _context: Context) -> None:
 
 
 class ShutterBar(PropertyGroup):
-    weight: labelled(FloatProperty, "Weight", "Contribution of its frame", default=1, min=0, max=MAX_BAR, soft_max=1)
+    weight: labelled(FloatProperty, "Weight", "How much the frame counts", default=1, min=0, max=MAX_BAR, soft_max=1)
 
 
 @with_fields(model.Shutter, name={"set_transform": _shutter_renamed}, color={"update": _shutter_recolored})

@@ -212,7 +212,7 @@ def check_counts(effect: PropertyGroup) -> None:
     if not effect.shutters:
         raise EffectError(rpt_('"{effect}" has no shutter').format(effect=effect.name))
     if full := validation.why_full(effect):
-        raise EffectError(full)
+        raise EffectError(": ".join((validation.place(effect), full)))
 
 
 def _options(sampling: Sampling) -> keyframes.Channel:

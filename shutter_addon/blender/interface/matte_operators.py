@@ -9,6 +9,7 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy.types import Context, Operator, PropertyGroup
 from bpy_extras.io_utils import ImportHelper
 
+from ...core.messages import UserError
 from ...core.model.choices import RAMPS
 from ...core.model.limits import MAX_CHANNEL
 from ..data import matte_content, recipe_import, selection, strips, validation
@@ -73,7 +74,10 @@ class SHUTTER_OT_matte_export(OfEffect, ImportHelper, Operator):
     def change(self, _context: Context, effect: PropertyGroup) -> None:
         folder = Path(bpy.path.abspath(self.directory or str(Path(self.filepath).parent)))
         region, word = selection.active_region(effect), self.format.lower()
-        count = matte_export.save(self.edit, effect, self.effect_strip, region, folder, word)
+        try:
+            count = matte_export.save(self.edit, effect, self.effect_strip, region, folder, word)
+        except OSError as error:
+            raise UserError(f"{folder}: {error.strerror or error}") from None
         self.report({"INFO"}, rpt_('Saved {count} pictures in "{folder}"').format(count=count, folder=folder))
 
 

@@ -9,7 +9,7 @@ from bpy.props import EnumProperty
 from bpy.types import Context, Event, Operator, PropertyGroup
 
 from ...core import recent_errors
-from ...core.messages import UserError, sentence
+from ...core.messages import UserError
 from ...core.recipes import recipe
 from ..data import selection
 from ..rendering.effect_source import FAULTS
@@ -28,13 +28,13 @@ def redraw(context: Context) -> None:
                 area.tag_redraw()
 
 
-def report(operator: Operator, words: str, kind: str = "WARNING") -> set[str]:
+def report(operator: Operator, sentence: str, kind: str = "WARNING") -> set[str]:
     """Report a translated sentence as a warning or error, and keep it for *Copy Report* without its names.
 
     Return the result of an operator that has changed nothing.
     """
     recent_errors.record(level=2)
-    operator.report({kind}, words)
+    operator.report({kind}, sentence)
     return {"CANCELLED"}
 
 
@@ -75,9 +75,9 @@ class Named(Mixin):
     @classmethod
     def poll(cls, context: Context) -> bool:
         """Grey the operator out and show the reason, if there is one."""
-        if why := cls.refusal(context):
-            cls.poll_message_set(why)
-        return not why
+        if sentence := cls.refusal(context):
+            cls.poll_message_set(sentence)
+        return not sentence
 
     @classmethod
     def refusal(cls, context: Context) -> str | None:
@@ -90,9 +90,6 @@ class Named(Mixin):
             return step(*arguments) or {"FINISHED"}
         except (*FAULTS, UserError) as error:
             return report(self, str(error), "ERROR")
-        except OSError as error:  # of an operator with a file browser, for what it writes
-            words = f"{getattr(self, 'directory', '') or self.filepath}: {error.strerror or error}"
-            return report(self, sentence(words), "ERROR")
 
 
 class OfEffect(Named):

@@ -11,7 +11,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, St
 from bpy.types import Context, Event, Operator, PropertyGroup
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
-from ...core.messages import EffectError
+from ...core.messages import EffectError, UserError
 from ...core.model import shutters
 from ...core.model.choices import CONTEXT, DRAWN
 from ...core.recipes import recipe_file
@@ -202,7 +202,7 @@ class SHUTTER_OT_bar_set(OfEffect, Operator):
     needs = (needs.a_shutter,)
 
     bar: IntProperty(name="Bar", description="Number of the bar, from 1", default=1, min=1)
-    weight: FloatProperty(name="Weight", description="Contribution of its frame", min=0.0, soft_max=1.0)
+    weight: FloatProperty(name="Weight", description="How much the frame counts", min=0.0, soft_max=1.0)
 
     def invoke(self, context: Context, event: Event) -> set[str]:
         if event.value == "DOUBLE_CLICK":  # from a menu, the pointer is anywhere
@@ -362,7 +362,10 @@ class SHUTTER_OT_recipe_export(OfEffect, ExportHelper, Operator):
 
     def change(self, _context: Context, effect: PropertyGroup) -> None:
         path = chosen_file(self)
-        recipe_file.save(matte_export.recipe_for(self.edit, effect, self.effect_strip, Path(path)), path)
+        try:
+            recipe_file.save(matte_export.recipe_for(self.edit, effect, self.effect_strip, Path(path)), path)
+        except OSError as error:
+            raise UserError(f"{path}: {error.strerror or error}") from None
         self.report({"INFO"}, rpt_('Saved "{path}"').format(path=path))
         if data_format.is_newer(self.edit):
             report(self, rpt_("Data of a newer version of Virtual Shutter is left out"))

@@ -285,8 +285,9 @@ def _cancel_and_show() -> None:
 def popup(words: str, **looks: str) -> None:
     """Show a translated sentence in a popup at the pointer."""
     manager = bpy.context.window_manager
-    with bpy.context.temp_override(window=bpy.context.window or manager.windows[0]):
-        manager.popup_menu(lambda menu, _context: menu.layout.label(text=words, translate=False), **looks)
+    if window := bpy.context.window or next(iter(manager.windows), None):  # none while a file is loaded
+        with bpy.context.temp_override(window=window):
+            manager.popup_menu(lambda menu, _context: menu.layout.label(text=words, translate=False), **looks)
 
 
 def _cancel() -> None:

@@ -290,7 +290,7 @@ MESSAGES = {
     ("*", "Bar"): "Balken",
     ("*", "Number of the bar, from 1"): "Nummer des Balkens, ab 1",
     ("*", "Weight"): "Gewicht",
-    ("*", "Contribution of its frame"): "Wie viel sein Bild beiträgt",
+    ("*", "How much the frame counts"): "Wie viel das Bild zählt",
     ("*", "The shutter has {count} bars"): "Der Verschluss hat {count} Balken",
     ("Operator", "Paint Bars"): "Balken malen",
     # Regions
@@ -517,7 +517,7 @@ MESSAGES = {
     ("*", "Width"): "Breite",
     ("*", "Width of the lines as a fraction of the picture's height"): "Breite der Linien als Bruchteil der Bildhöhe",
     ("*", "Location"): "Position",
-    ("*", "In fractions of the picture"): "Als Bruchteil des Bildes",
+    ("*", "Movement, in fractions of the picture"): "Bewegung, als Bruchteil des Bildes",
     ("*", "Rotation"): "Rotation",
     ("*", "Rotation about the center"): "Rotation um die Mitte",
     ("Operator", "Transform Region"): "Region transformieren",
@@ -1056,8 +1056,8 @@ MESSAGES = {
     ("Virtual Shutter", "Fade Out When Lost"): "Ausblenden, wenn verloren",
     (
         "*",
-        "Fade a region or the camera out where the track ends",
-    ): "Eine Region oder die Kamera ausblenden, wo die Verfolgung endet",
+        "Fade out a region, or the camera's influence, where the track ends",
+    ): "Eine Region oder den Einfluss der Kamera ausblenden, wo die Verfolgung endet",
     ("*", "Part of the motion that the exposure follows"): "Was von der Bewegung gilt",
     ("*", "Smoothness"): "Glätte",
     (
