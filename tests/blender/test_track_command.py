@@ -164,8 +164,9 @@ def test_where_it_ends_is_said(track, tmp_path, shown, last):
     region = recipe_file.load(tmp_path / "t.json").for_picture(4 / 3).regions[1]
     assert [region.opacity.at(frame) for frame in (1, last, last + 1, 99)] == [1, 1, 0, 0]
     assert [key.frame for key in keys(tmp_path / "t.json")] == [1, 3, last]
-    assert track(first, *options, "--hold", recipe=plain() | shown)[0] == 0
+    assert track(first, *options, "--hold", recipe=plain(keys=[{"frame": 1}, {"frame": last + 3}]) | shown)[0] == 0
     assert recipe_file.load(tmp_path / "t.json").regions[1].opacity == Constant(1.0)
+    assert keys(tmp_path / "t.json")[-1].frame == last + 3
 
 
 def test_opacities_that_a_recipe_has_stay(track, film, tmp_path):
