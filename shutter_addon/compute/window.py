@@ -198,7 +198,7 @@ class Frames(Window):
             self._held[layer] = index
 
     def stored(self) -> Iterator[tuple[Part, Texture]]:
-        """See Window."""
+        """As Window.stored. Frames kept on the host are sent to one texture, part after part."""
         if self._host is None:
             yield from super().stored()
             return

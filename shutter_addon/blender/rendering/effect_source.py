@@ -144,7 +144,7 @@ def steps_of(medium: FrameSource, smooth: int | str, window: int, *, skip_repeat
 
 
 def steps_key(snapshot: Snapshot) -> tuple:
-    """Return what the steps depend on."""
+    """Return what an effect's steps from a filmed frame to the next (find_steps) depend on."""
     options = _options(snapshot)
     return snapshot.source.key, options.step, options.window, options.skip_repeats
 

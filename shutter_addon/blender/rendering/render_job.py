@@ -283,7 +283,7 @@ def _cancel_and_show() -> None:
 
 
 def popup(words: str, **looks: str) -> None:
-    """Show a translated sentence in a popup at the pointer."""
+    """Show a sentence, already translated, in a popup at the pointer. `looks` are its title and icon."""
     manager = bpy.context.window_manager
     if window := bpy.context.window or next(iter(manager.windows), None):  # none while a file is loaded
         with bpy.context.temp_override(window=window):

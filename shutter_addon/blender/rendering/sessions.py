@@ -35,7 +35,7 @@ class _Sessions(NamedTuple):
 
 
 def _ask_window() -> None:
-    """Free the window's memory for a job. The window is not drawn meanwhile, and loads it again."""
+    """In a render job, free the memory of Blender's window. It is not drawn until it loads its frames again."""
     if render_job.where() is Where.JOB:
         main_thread.ask(SESSIONS.window.free, _ANSWER)
 

@@ -115,7 +115,7 @@ def _shutter(
 
 
 def _said(part: Any, shown: range) -> dict[str, Any]:
-    """Return the fields of a part of an effect."""
+    """Return a part's fields as a recipe has them: keys or constants over the frames `shown`."""
     said: dict[str, Any] = {}
     for name, each in fields_of(type(part)).items():
         value = getattr(part, name)

@@ -48,7 +48,7 @@ Stroke = Annotated[list[Point], Within(1, math.inf, "empty: a stroke has at leas
 
 @dataclass(frozen=True)
 class ValueKey:
-    """A number at a frame."""
+    """A key: a number at a frame, with its easing."""
 
     frame: Frame
     value: float
