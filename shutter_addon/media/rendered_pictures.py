@@ -7,7 +7,7 @@ from contextlib import closing, suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from OpenImageIO import ImageBuf, ImageBufAlgo, ImageInput, geterror
+from OpenImageIO import ImageInput, geterror
 
 from ..core.farm import job_file
 from .files import check_name, pyav_missing
@@ -62,8 +62,10 @@ def read(path: Path, edit: str | None = None) -> RenderedPicture | None:
 
 def is_transparent(path: Path) -> bool:
     """Return whether any pixel is not opaque. The last channel is alpha. False if the picture cannot be read."""
-    least = ImageBufAlgo.computePixelStats(ImageBuf(check_name(path))).min
-    return bool(least) and least[-1] < 1
+    image = ImageInput.open(check_name(path))
+    last = image.spec().nchannels - 1 if image else 0
+    alpha = image.read_image(0, 0, last, last + 1, "float") if image else None
+    return alpha is not None and bool(alpha.min() < 1)
 
 
 def _is_sound_png(path: Path) -> bool:
