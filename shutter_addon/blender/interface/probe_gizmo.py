@@ -96,9 +96,9 @@ class SHUTTER_GT_probe(Gizmo):
         return -1
 
 
-def _draw(region: Region, point: Sequence[float], shutters: Sequence[PropertyGroup], *probed: np.ndarray) -> None:
+def _draw(region: Region, point: Sequence, shutters: Sequence, shares: np.ndarray, mixed: np.ndarray) -> None:
     """Draw the probe, with what `probed_at` has returned."""
-    unit, (shares, mixed) = drawing.ui_scale(), probed
+    unit = drawing.ui_scale()
     frame, bars, lines = layout(point, (region.width, region.height), len(shutters), unit)
     colors = np.array([shutter.color for shutter in shutters])
     (x, y), arm = point, 6 * unit
