@@ -39,6 +39,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 import exact_layers
 
 from shutter_addon.compute import diffusion_gpu, edge_diffusion_gpu, guide
+from shutter_addon.compute.devices.gl import GLDevice
+from shutter_addon.compute.devices.passes import Pass, read_pass
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.layer_frames import WeightedFrames
 from shutter_addon.compute.request import Behind, Coefficients, Exposure, Request
@@ -48,8 +50,6 @@ from shutter_addon.core.frames.frame_source import FrameSource, SourceFile
 from shutter_addon.core.model import mattes, scribbles, shutters
 from shutter_addon.core.model.frame_state import Combine, Following, FrameState, Layers, Options
 from shutter_addon.core.pixels import compositor
-from shutter_addon.devices.gl import GLDevice
-from shutter_addon.devices.passes import Pass, read_pass
 
 HERE = Path(__file__).resolve().with_suffix("")
 COMBINED = ("lightest", "darkest", "median")

@@ -38,7 +38,7 @@ GROUPS = {
         ],
         [
             *("tests/window/gpu_*.py", "tests/window/own_gpu_story.py", "tests/window/memory_story.py"),
-            *("shutter_addon/devices/*.py", "shutter_addon/blender/devices/*.py"),
+            *("shutter_addon/compute/devices/*.py", "shutter_addon/blender/devices/*.py"),
             "shutter_addon/blender/rendering/*.py",
         ],
     ),
@@ -55,7 +55,7 @@ GROUPS = {
         ["tests/blender/test_features.py"],
         ["shutter_addon/features/**/*.py", "shutter_addon/blender/**/*.py"],
     ),
-    "Metal": (["tests/compute/test_metal.py"], ["shaders/**/*", "shutter_addon/devices/passes.py"]),
+    "Metal": (["tests/compute/test_metal.py"], ["shaders/**/*", "shutter_addon/compute/devices/passes.py"]),
     "planted faults": (["tests/differential/test_planted.py"], ["tests/differential/*.py"]),
     "measures": (
         ["tests/test_measures.py"],

@@ -4,7 +4,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from shutter_addon.devices.gl import FORMATS
+from shutter_addon.compute.devices.gl import FORMATS
 
 
 def filled(device):

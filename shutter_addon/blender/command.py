@@ -10,8 +10,8 @@ from importlib import import_module
 from pathlib import Path
 
 from .. import features
+from ..compute.devices.device import NoDeviceError
 from ..core.messages import UserError
-from ..devices.device import NoDeviceError
 from ..media.files import check_name
 from .output import film_output
 from .rendering import render_job, render_settings

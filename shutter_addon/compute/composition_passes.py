@@ -6,8 +6,8 @@ import numpy as np
 
 from ..core.model import shutters
 from ..core.model.frame_state import FrameState
-from ..devices.llvmpipe import MOST_ITERATIONS, frames_iterations
-from ..devices.passes import Pass, read_pass
+from .devices.llvmpipe import MOST_ITERATIONS, frames_iterations
+from .devices.passes import Pass, read_pass
 from .running_sums import Sums
 from .window import BLOCK, Window
 

@@ -19,8 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from ..devices.device import Device, Given, NamedTextures, Texture
-from ..devices.passes import Pass, read_pass
+from .devices.device import Device, Given, NamedTextures, Texture
+from .devices.passes import Pass, read_pass
 from .diffusion import NOTHING
 
 # V-cycles of a solve that starts from nothing. Largest error × 255 after 1, 2, 3, 4 cycles: 3.9, 0.67, 0.66, 0.66 over

@@ -10,8 +10,8 @@ from itertools import pairwise
 import numpy as np
 
 from ..core.pixels.conductances import cell_side, resistances
-from ..devices.device import Device, Given, Texture
-from ..devices.passes import read_pass
+from .devices.device import Device, Given, Texture
+from .devices.passes import read_pass
 from .diffusion import NOTHING
 from .diffusion_gpu import FINISH, Diffusion, _Grid, operators
 

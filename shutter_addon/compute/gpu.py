@@ -16,9 +16,6 @@ from ..core.frames.frame_source import FrameSource
 from ..core.model import windows
 from ..core.model.frame_state import AVERAGE, Combine, Following, FrameState
 from ..core.pixels.shown_levels import Display
-from ..devices.device import Device, Given, NamedTextures, NoDeviceError, Texture
-from ..devices.llvmpipe import MOST_ITERATIONS, median_iterations
-from ..devices.passes import Pass, read_pass
 from . import cpu
 from .composition_passes import (
     EDGES,
@@ -32,6 +29,9 @@ from .composition_passes import (
     table,
     way_of,
 )
+from .devices.device import Device, Given, NamedTextures, NoDeviceError, Texture
+from .devices.llvmpipe import MOST_ITERATIONS, median_iterations
+from .devices.passes import Pass, read_pass
 from .layer_frames import WeightedFrames
 from .request import Coefficients, Handle, Request
 from .running_sums import STORED_SUMS, Sums, WeightedSums

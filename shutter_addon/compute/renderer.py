@@ -14,15 +14,15 @@ from ..core.frames.frame_source import FrameSource
 from ..core.model import scribbles, windows
 from ..core.model.frame_state import FrameState
 from ..core.model.mattes import MatteReader
-from ..devices.device import Budget, NoDeviceError
 from . import guide
 from .cpu import CPUCompositor
+from .devices.device import Budget, NoDeviceError
 from .gpu import GPUCompositor
 from .layered_renderer import LayeredRenderer
 from .request import Coefficients, Compositor, Handle, Request
 
 if TYPE_CHECKING:
-    from ..devices.gl import GLDevice
+    from .devices.gl import GLDevice
 
 # Pictures whose frames are decoded in advance, and how many frames or bytes of them lie decoded at most, besides those
 # on the device: enough for a long window, whose frames are decoded while its first picture is diffused and compiled.
@@ -45,7 +45,7 @@ def open_gl(budget: Budget | None = None, ask_others: Callable[[], None] | None 
         NoDeviceError: OpenGL 4.3 or moderngl is missing
     """
     try:
-        from ..devices.gl import GLDevice
+        from .devices.gl import GLDevice
     except ImportError as error:  # a package without wheels, or one for another Python
         raise NoDeviceError(f"the Python package moderngl cannot be loaded ({error})") from None
     return GLDevice(budget, ask_others)

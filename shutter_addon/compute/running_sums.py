@@ -10,9 +10,9 @@ from ..core.frames.frame_source import TILE, FrameSource, Moment, Planes, chroma
 from ..core.model import windows
 from ..core.model.frame_state import Light, Options
 from ..core.stopping import kept
-from ..devices import llvmpipe
-from ..devices.device import Device, Given, Texture
-from ..devices.passes import Pass, read_pass
+from .devices import llvmpipe
+from .devices.device import Device, Given, Texture
+from .devices.passes import Pass, read_pass
 from .layer_frames import WeightedFrames
 from .window import Part, Window, decoding
 

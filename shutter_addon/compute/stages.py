@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from ..core.model.mattes import Matte
-from ..devices.device import Device, Given, NamedTextures, Texture
-from ..devices.passes import read_pass
 from .composition_passes import padded
+from .devices.device import Device, Given, NamedTextures, Texture
+from .devices.passes import read_pass
 from .diffusion_gpu import Diffusion
 from .edge_diffusion_gpu import EdgeDiffusion
 from .request import Behind, Exposure

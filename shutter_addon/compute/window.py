@@ -11,9 +11,9 @@ from ..core.frames import light
 from ..core.frames.frame_source import FrameSource
 from ..core.model import windows
 from ..core.model.frame_state import Light, Options
-from ..devices import llvmpipe
-from ..devices.device import Device, NamedTextures, NoDeviceError, Texture, texel_bytes
-from ..devices.passes import read_pass
+from .devices import llvmpipe
+from .devices.device import Device, NamedTextures, NoDeviceError, Texture, texel_bytes
+from .devices.passes import read_pass
 
 # The most bytes of a texture array.
 BAND_BYTES = llvmpipe.MOST_BYTES

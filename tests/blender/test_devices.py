@@ -11,8 +11,8 @@ from shutter_addon.blender.data import preferences
 from shutter_addon.blender.devices import available
 from shutter_addon.blender.rendering import job_snapshots, render_settings, sessions
 from shutter_addon.compute.cpu import CPUCompositor
+from shutter_addon.compute.devices.device import NoDeviceError
 from shutter_addon.compute.gpu import GPUCompositor
-from shutter_addon.devices.device import NoDeviceError
 
 BORROWED = "composing on Blender's own GPU, "  # and its name
 
@@ -60,7 +60,7 @@ def test_without_moderngl_blenders_own_gpu_renders(command, film, opengl, tmp_pa
 
 def test_a_device_that_was_asked_for_is_not_replaced(command_here, film, tmp_path, monkeypatch):
     first, data = film
-    for module in ("moderngl", "shutter_addon.devices.gl"):
+    for module in ("moderngl", "shutter_addon.compute.devices.gl"):
         monkeypatch.setitem(sys.modules, module, None)
     monkeypatch.setattr(available, "opengl", available.opengl.__wrapped__)  # which remembers what it found
     done = command_here(first, "--output", tmp_path / "no", "--device", "opengl", recipe=data, check=False)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from shutter_addon.devices.passes import read_pass
+from shutter_addon.compute.devices.passes import read_pass
 
 
 def completed(quad, shown, stage: str) -> str:

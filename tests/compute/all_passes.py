@@ -5,8 +5,8 @@ import itertools
 
 from shutter_addon.compute import composition_passes, diffusion_gpu, edge_diffusion_gpu, gpu, running_sums, stages
 from shutter_addon.compute.composition_passes import MODES, composition
+from shutter_addon.compute.devices.passes import Pass, read_pass
 from shutter_addon.core.model.frame_state import AVERAGE, Combine
-from shutter_addon.devices.passes import Pass, read_pass
 
 _WAYS = ("frames", "search", "value")
 

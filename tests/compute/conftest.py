@@ -5,7 +5,7 @@ import os
 import numpy as np
 import pytest
 
-from shutter_addon.devices.device import NoDeviceError
+from shutter_addon.compute.devices.device import NoDeviceError
 
 
 @pytest.hookimpl(wrapper=True)
@@ -54,7 +54,7 @@ def gpu_device(request):
     if request.param == "blender":
         yield request.getfixturevalue("blender_device")
         return
-    from shutter_addon.devices.gl import GLDevice
+    from shutter_addon.compute.devices.gl import GLDevice
 
     device = GLDevice()
     yield device
@@ -64,7 +64,7 @@ def gpu_device(request):
 @pytest.fixture(scope="module")
 def on_moderngl():
     """Solves for coefficients on moderngl's device: labels, count, and what follows edges."""
-    from shutter_addon.devices.gl import GLDevice
+    from shutter_addon.compute.devices.gl import GLDevice
 
     device = GLDevice()
     yield from _solving(device)

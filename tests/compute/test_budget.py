@@ -10,13 +10,13 @@ from test_matting import Values, mattes
 from test_moved import following
 
 from shutter_addon.compute import running_sums, window
+from shutter_addon.compute.devices import device as devices
+from shutter_addon.compute.devices.device import Budget, NoDeviceError
+from shutter_addon.compute.devices.gl import GLDevice
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer
 from shutter_addon.compute.request import Request
 from shutter_addon.core.frames.frame_source import FrameSource
-from shutter_addon.devices import device as devices
-from shutter_addon.devices.device import Budget, NoDeviceError
-from shutter_addon.devices.gl import GLDevice
 
 SIZE = 128, 72
 PIXELS = SIZE[0] * SIZE[1]

@@ -5,6 +5,7 @@ import pytest
 
 from shutter_addon.compute import cpu, window
 from shutter_addon.compute.cpu import CPUCompositor
+from shutter_addon.compute.devices import llvmpipe
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer, open_compositor
 from shutter_addon.compute.request import Request
@@ -14,7 +15,6 @@ from shutter_addon.core.model import shutters, windows
 from shutter_addon.core.model.frame_state import FrameState, Options
 from shutter_addon.core.model.scribbles import Shape
 from shutter_addon.core.pixels import compositor
-from shutter_addon.devices import llvmpipe
 
 LEVEL = 1 / 255
 

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from shutter_addon.devices.device import NoDeviceError
+from shutter_addon.compute.devices.device import NoDeviceError
 
 KINDS = {"rgba8": np.uint8, "rgba16": np.uint16, "rgba16f": np.float16, "rgba32f": np.float32, "r32f": np.float32}
 KINDS |= {"r32ui": np.uint32}
@@ -80,7 +80,7 @@ def test_there_are_limits(gpu_device):
 
 
 def test_moderngl_leaves_blenders_context_current(blender_device):
-    from shutter_addon.devices.gl import GLDevice
+    from shutter_addon.compute.devices.gl import GLDevice
 
     other = GLDevice()
     frame = samples("rgba8", 4, 4)
@@ -98,7 +98,7 @@ def test_moderngl_leaves_blenders_context_current(blender_device):
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere none is called by its address")
 def test_a_lack_of_functions_is_met_before_pictures(monkeypatch):
     """As where a driver's EGL finds none: to call nothing would end Blender."""
-    from shutter_addon.devices import gl
+    from shutter_addon.compute.devices import gl
 
     egl = gl._egl()  # the library, in whose place another comes
     names = "eglGetCurrentSurface", "eglGetCurrentDisplay", "eglGetCurrentContext", "eglMakeCurrent"

@@ -9,6 +9,7 @@ import pytest
 from test_composition import LEVEL, SHAPES, Footage, footage, state
 
 from shutter_addon.compute import layer_frames
+from shutter_addon.compute.devices.device import Budget
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer, open_compositor, open_gl
 from shutter_addon.compute.request import Request
@@ -19,7 +20,6 @@ from shutter_addon.core.model.frame_state import Following, FrameState, Layers, 
 from shutter_addon.core.model.mattes import FileFrame, Matte
 from shutter_addon.core.pixels import compositor, layering
 from shutter_addon.core.pixels.layering import separated
-from shutter_addon.devices.device import Budget
 from shutter_addon.features.smooth.smooth import SmoothSource
 from shutter_addon.media.flow import Between
 from shutter_addon.media.matte_values import MatteValues

@@ -6,7 +6,7 @@ import re
 import pytest
 from all_passes import PASSES, told
 
-from shutter_addon.devices.passes import SHADERS, read_pass
+from shutter_addon.compute.devices.passes import SHADERS, read_pass
 
 # Images, samplers and uniform blocks of a pass; bytes of a block, and of all constants; invocations of a workgroup
 # along each axis, and in all.

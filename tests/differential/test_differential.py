@@ -12,8 +12,8 @@ from cases import KINDS, make, make_smooth
 from compare import DifferenceError, can_be_a_film, check, check_films, check_mixed, open_devices
 from reference import DEFAULTS, layers_at, picture, shown
 
-from shutter_addon.devices import gl
-from shutter_addon.devices.passes import SHADERS
+from shutter_addon.compute.devices import gl
+from shutter_addon.compute.devices.passes import SHADERS
 
 SEEDS = range(78)  # six for each kind of footage
 BATCH = 13

@@ -11,10 +11,10 @@ from compare import open_devices
 from test_differential import MIXED, each_difference
 
 from shutter_addon.compute import cpu, gpu, layer_frames
+from shutter_addon.compute.devices import gl
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import keyframes, mattes, scribbles, shutters, state_at, windows
 from shutter_addon.core.pixels import compositor, layering
-from shutter_addon.devices import gl
 from shutter_addon.media import matte_values
 
 FAULTS = {

@@ -6,11 +6,11 @@ import av
 import numpy as np
 import pytest
 
+from shutter_addon.compute.devices.device import NoDeviceError
 from shutter_addon.compute.renderer import open_gl
 from shutter_addon.compute.running_sums import Sums
 from shutter_addon.core.frames.frame_source import Planes
 from shutter_addon.core.model.frame_state import Options
-from shutter_addon.devices.device import NoDeviceError
 from shutter_addon.media import open_source
 from shutter_addon.media.cuts import signature
 

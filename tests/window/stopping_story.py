@@ -16,7 +16,7 @@ class Passes:
         self.all, self.whole, self.begun = 0, [], None
         devices = [part("blender.devices.main_thread").RelayedDevice]
         if not os.environ.get("SHUTTER_HIDDEN"):
-            devices.append(part("devices.gl").GLDevice)
+            devices.append(part("compute.devices.gl").GLDevice)
         for device in devices:
             device.run = self._counted(device.run)
         renderer = part("compute.renderer").Renderer

@@ -8,8 +8,8 @@ from pathlib import Path
 import bpy
 from bpy.types import Scene
 
+from ...compute.devices.device import NoDeviceError
 from ...core.farm import job_file
-from ...devices.device import NoDeviceError
 from ..data import external_files, versions
 from ..devices import available
 from ..output import edit_check, error_report, film_output, shared_frames

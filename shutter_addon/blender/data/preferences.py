@@ -63,7 +63,7 @@ def device() -> str:
 
 
 def gpu_memory() -> int:
-    """Return the megabytes of the GPU that textures may take; 0: as devices.device allows."""
+    """Return the megabytes of the GPU that textures may take; 0: as compute.devices.device allows."""
     return getattr(_preferences(), "gpu_memory", 0)
 
 

@@ -10,11 +10,11 @@ import gpu
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...compute.cpu import CPUCompositor
+from ...compute.devices.device import NoDeviceError
 from ...compute.gpu import GPUCompositor
 from ...compute.renderer import open_gl
 from ...compute.request import Compositor
 from ...core import threads
-from ...devices.device import NoDeviceError
 from .blender_gpu import BlenderDevice, opens_in_background
 from .main_thread import RelayedDevice
 

@@ -21,9 +21,9 @@ import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 from gpu.types import GPUTexture
 
-from ...devices.device import Budget, Device, NoDeviceError, Texture, allowed, machine_memory, texel_bytes
-from ...devices.llvmpipe import is_llvmpipe
-from ...devices.passes import Pass, read_pass
+from ...compute.devices.device import Budget, Device, NoDeviceError, Texture, allowed, machine_memory, texel_bytes
+from ...compute.devices.llvmpipe import is_llvmpipe
+from ...compute.devices.passes import Pass, read_pass
 
 _TYPES = {"sampler2DArray": "FLOAT_2D_ARRAY", "usampler2DArray": "UINT_2D_ARRAY"}
 _AS_IT_IS, _WHOLE, _OPAQUE_BYTES, _PAIRS_OF_BYTES, _SIXTEEN_BITS = range(5)

@@ -18,9 +18,9 @@ from typing import Any, TypeVar
 import bpy
 import gpu
 
+from ...compute.devices.device import Device
+from ...compute.devices.passes import Pass
 from ...core import threads
-from ...devices.device import Device
-from ...devices.passes import Pass
 from .blender_gpu import BlenderDevice, has_context
 
 T = TypeVar("T")

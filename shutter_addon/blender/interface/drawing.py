@@ -13,9 +13,9 @@ from gpu_extras.batch import batch_for_shader
 from mathutils import Matrix
 from numpy.typing import ArrayLike
 
+from ...compute.devices.passes import read_pass
 from ...core.model.scribbles import mapped
 from ...core.pixels import patterns
-from ...devices.passes import read_pass
 from ..data import annotations
 from ..data.preview_areas import Shown
 from ..devices import blender_gpu

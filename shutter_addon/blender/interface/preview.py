@@ -13,6 +13,7 @@ from bpy.props import PointerProperty
 from bpy.types import Context, PropertyGroup, Region
 
 from ... import features
+from ...compute.devices.device import Texture
 from ...compute.renderer import Renderer
 from ...compute.request import Request
 from ...core import stopping
@@ -20,7 +21,6 @@ from ...core.model.choices import CONTEXT
 from ...core.model.effect import SubjectRegion
 from ...core.model.fields import Labelled
 from ...core.model.frame_state import FrameState
-from ...devices.device import Texture
 from ..data import annotations, preview_areas, selection
 from ..data.preview_areas import Shown
 from ..data.properties import with_fields

@@ -15,9 +15,9 @@ import bpy
 import gpu
 from bpy.types import PropertyGroup, Scene, Strip
 
+from ...compute.devices.device import MEGABYTE, NoDeviceError
 from ...core import recent_errors
 from ...core.messages import UserError
-from ...devices.device import MEGABYTE, NoDeviceError
 from ..data import snapshot, source_media, strips, versions
 from ..devices import available
 from ..rendering import render_settings

@@ -7,13 +7,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ... import features
+from ...compute.devices.device import NoDeviceError
 from ...core import recent_errors
 from ...core.caches import RecentValues
 from ...core.frames.frame_source import FrameSource
 from ...core.messages import EffectError, of_file
 from ...core.model.clip import Clip
 from ...core.model.frame_state import Options
-from ...devices.device import NoDeviceError
 from ...media import MediaError
 from ...media.cuts import ShotSource
 from ...media.derived import VECTORS, StoredVectors

@@ -11,11 +11,11 @@ import OpenImageIO
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
+from ...compute.devices.device import MEGABYTE
 from ...compute.renderer import Renderer
 from ...compute.request import Request
 from ...core import stopping
 from ...core.pixels.matte_grid import block_means
-from ...devices.device import MEGABYTE
 from ...media import color
 from ...media.image_writing import write_exr
 from ..data import consistency

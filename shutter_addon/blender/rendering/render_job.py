@@ -25,9 +25,9 @@ import bpy
 import numpy as np
 from bpy.types import Scene
 
+from ...compute.devices.device import Budget
 from ...core import threads
 from ...core.messages import sentence, signed
-from ...devices.device import Budget
 from ..data.snapshot import Snapshot
 from ..data.strips import ENGINE
 from ..devices import main_thread

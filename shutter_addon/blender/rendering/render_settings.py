@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import AbstractContextManager
 
-from ...devices.device import MEGABYTE, Budget, allowed
+from ...compute.devices.device import MEGABYTE, Budget, allowed
 from ..data import preferences
 from ..data.property_copy import for_a_while
 from ..devices import available

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
+from ...compute.devices.device import NoDeviceError
 from ...compute.renderer import Renderer
 from ...compute.request import Request
 from ...core import stopping, threads
@@ -19,7 +20,6 @@ from ...core.messages import translated
 from ...core.model.state_at import state_at
 from ...core.pixels.shown_levels import Display
 from ...core.stopping import StoppedError
-from ...devices.device import NoDeviceError
 from ...media.matte_values import Late, MatteValues
 from ..data.snapshot import Snapshot
 from ..devices import available, main_thread

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
-SHADERS = Path(__file__).resolve().parents[2] / "shaders"
+SHADERS = Path(__file__).resolve().parents[3] / "shaders"
 
 _DIRECTIVE = re.compile(r"#\s*(\w+)\s*(.*)")
 _TERM = re.compile(r"(!?)(?:defined\((\w+)\)|(\w+)(?: == (\d+))?)")

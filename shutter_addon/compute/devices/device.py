@@ -18,7 +18,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from ..core import stopping
+from ...core import stopping
 from .passes import Pass
 
 MEGABYTE = 1 << 20
