@@ -74,7 +74,7 @@ def _choices(field: Field) -> str:
 
 def _values(field: Field) -> str:
     if field.choices:
-        return ", ".join(f"`{word}`" for word in field.words)
+        return ", ".join(f"`{word}`" for word in field.words.values())
     if isinstance(field.default, bool):
         return "`true`, `false`"
     if isinstance(field.default, str):

@@ -1,8 +1,7 @@
 """The way of a frame through the extension: its stops, which are the functions that make it, in the order in which they
 are first called; and how often it comes back to a room that it had left.
 
-A room is a folder of the extension, as docs/developers.md lists them. `core` and both `devices` are libraries, which
-call nobody back: what they do belongs to whoever calls, and no frame comes back to them."""
+A room is a folder of the extension, or of blender/, as docs/developers.md lists them."""
 
 import sys
 import threading
@@ -12,7 +11,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 _TOOL = 4  # of sys.monitoring's, one for nobody in particular
-_LIBRARIES = "core", "devices", "blender/devices"
 _AHEAD = "Virtual Shutter"  # the thread that decodes frames ahead, whenever it comes to them
 
 
@@ -86,7 +84,6 @@ def returns(stops: list[Stop]) -> list[Stop]:
     """The stops at which a frame comes back to a room that it had left: it was there before, and nothing there waits
     for it."""
     seen, back = set(), []
-    stops = [stop for stop in stops if stop.room not in _LIBRARIES]
     for before, stop in pairwise([stops[0], *stops]):
         if stop.room != before.room and stop.room in seen and stop.room not in stop.within:
             back.append(stop)

@@ -50,7 +50,7 @@ EXPORTED = Options, model.Effect, model.Camera, model.Shutter
 def other_value(field: Field):
     """A value beside the default, as the model has it."""
     if field.choices:
-        return next(word for word in field.words if word != field.default)
+        return next(word for word in field.words.values() if word != field.default)
     if isinstance(field.default, bool):
         return not field.default
     if isinstance(field.default, str):

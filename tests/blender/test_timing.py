@@ -10,7 +10,7 @@ from support import Like, image_strip, picture_of, started, write_frames
 from shutter_addon.blender.data import source_media, struct_dna
 from shutter_addon.blender.output import edit_check
 from shutter_addon.blender.rendering import render_job
-from shutter_addon.core.frames.retiming import RetimingKey, are_retiming_keys
+from shutter_addon.core.frames.retiming import RetimingKey
 from shutter_addon.core.model.clip import Clip
 
 
@@ -23,8 +23,10 @@ def source(edit, tmp_path):
 @pytest.mark.parametrize("pair", [(29.0, math.nan), (math.nan, 0.5), (math.inf, 0.5), (1e300, 0.5), (-1.0, 0.5)])
 def test_keys_that_cannot_be(bpy, pair):
     good = [(0.0, 0.0), (7.2, 0.5), (7.2, 0.5), (51.0, 1.0)]
-    assert are_retiming_keys([RetimingKey(index, 0, factor) for index, factor in good])
-    assert not are_retiming_keys([RetimingKey(index, 0, factor) for index, factor in (*good[:1], pair, *good[1:])])
+    assert source_media.are_retiming_keys([RetimingKey(index, 0, factor) for index, factor in good])
+    assert not source_media.are_retiming_keys(
+        [RetimingKey(index, 0, factor) for index, factor in (*good[:1], pair, *good[1:])]
+    )
 
 
 @pytest.mark.parametrize("keys", [2, 3])

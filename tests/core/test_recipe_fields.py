@@ -63,7 +63,7 @@ def said(field, way, value):
 def values(field):
     """Values that a recipe may have, and some that it may not."""
     if field.choices:
-        return field.words, ["other", 3.5, None]
+        return field.words.values(), ["other", 3.5, None]
     if isinstance(field.default, bool):
         return (True, False), [1, "true"]
     if isinstance(field.default, str):

@@ -56,7 +56,7 @@ def apply(scene, effect, strip, source: model.Effect, folder: Path = Path()) -> 
 
 def _set_fields(owner, path: str, part: Any, first: float, **curve) -> None:
     """Set the fields of a part of an effect, and their keys."""
-    for name, each in fields_of(type(part)).items():
+    for name, each in fields_of(part.__class__).items():
         value = getattr(part, name)
         if each.is_channel:
             _set_channel(owner, path, each.blender, value, first, **curve)

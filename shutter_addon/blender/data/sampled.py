@@ -44,7 +44,7 @@ def value(owner: PropertyGroup, field: Field, number: float | None = None) -> An
         EffectError: The value is none of its choices, or out of range.
     """
     if field.choices:
-        return field.word(validation.word(owner, field.blender, number))
+        return field.words[validation.word(owner, field.blender, number)]
     if isinstance(field.default, bool) and number is not None:
         return number >= 0.5
     if isinstance(field.default, bool | str):

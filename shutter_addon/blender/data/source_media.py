@@ -1,8 +1,10 @@
 """The footage of a source strip: its files, how it is opened, its timing, retiming keys and proxies."""
 
 import ctypes
-from collections.abc import Callable, Hashable, Iterable
+import math
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +15,7 @@ from bpy.types import Scene, Strip
 
 from ...core.caches import RecentValues
 from ...core.frames.frame_source import FrameSource
-from ...core.frames.retiming import RetimingKey, StripTiming, are_retiming_keys
+from ...core.frames.retiming import RetimingKey, StripTiming
 from ...media import MediaError, open_source
 from ...media.files import stamp
 from ...media.opening import with_proxy
@@ -229,6 +231,12 @@ def retiming_keys(strip: Strip) -> tuple[RetimingKey, ...] | None:
     stored = np.frombuffer(ctypes.string_at(first, count * kind.itemsize), kind) if count else ()
     keys = tuple(RetimingKey(*key.tolist()) for key in stored)
     return keys if are_retiming_keys(keys) else None
+
+
+def are_retiming_keys(keys: Sequence[RetimingKey]) -> bool:
+    """Return whether keys can be Blender's: finite and in order."""
+    numbers = [number for key in keys for number in (key.index, key.factor)]
+    return all(map(math.isfinite, numbers)) and all(a.index <= b.index for a, b in pairwise(keys))
 
 
 def proxy_of(scene: Scene, strip: Strip, percent: int) -> Proxy | None:

@@ -85,26 +85,28 @@ def of(effect_scene: Scene, scene_frame: float, ended: Callable[[], bool] | None
         if isinstance(taken, Exception):
             raise taken.with_traceback(None)
         return taken, taken.timeline_frame(scene_frame)
+    if bpy.app.background:
+        return _of_film(effect_scene, scene_frame)
     scene, effect, strip = strips.find_effect(effect_scene, scene_frame)
     frame = strips.timeline_frame(strip, scene_frame)
-    if not bpy.app.background:
-        return invalidation.current(scene, effect, strip, frame), frame
-    return _of_film(scene, effect, strip, frame), frame
+    return invalidation.current(scene, effect, strip, frame), frame
 
 
-def _of_film(scene: Scene, effect: PropertyGroup, strip: Strip, frame: float) -> Snapshot:
-    """Return the snapshot of an effect in the background."""
+def _of_film(effect_scene: Scene, scene_frame: float) -> tuple[Snapshot, float]:
+    """Return what `of` returns, in the background."""
+    scene, effect, strip = strips.find_effect(effect_scene, scene_frame)
+    frame = strips.timeline_frame(strip, scene_frame)
     key, frames = (effect.scene.session_uid, strip.name), {frame, frame + scene.frame_step}
     is_again = key in job.film_data.read and not render_job.scripts_act()
     if is_again and (known := job.film_data.read[key]) is not None and frame in known.frames:
-        return known
+        return known, frame
     if is_again:
         parts = [part for part in strips.effect_strips(scene) if part.scene == effect.scene]
         frames |= asked_frames(scene, parts, scene.session_uid == render_job.job.film)
     taken = snapshot.take(scene, effect, strip, frames)
     if render_job.runs():
         job.film_data.read[key] = taken if is_again else None
-    return taken
+    return taken, frame
 
 
 def _late(uid: int, scene_frame: float) -> Snapshot:

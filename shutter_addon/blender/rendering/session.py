@@ -114,8 +114,9 @@ class RenderContext:
             request = last[2]
             if (request.source, request.levels, request.display) == (key, self.levels, self.display):
                 return request
+        clip = clip_of(snapshot, source)
         with translated(rpt_):
-            index, state, way = state_at(snapshot.effect, clip_of(snapshot, source), frame)
+            index, state, way = state_at(snapshot.effect, clip, frame)
         state = state.in_blocks(max(state.options.aggregate // key.detail.divisor, 1))
         request = Request(index=index, state=state, direction=way, source=key, levels=self.levels, display=self.display)
         session.requests[key.place] = snapshot, frame, request

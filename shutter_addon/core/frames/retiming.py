@@ -3,7 +3,6 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -24,7 +23,7 @@ class StripTiming:
     Attributes:
         first: The frame of the medium that is the content's first.
         scene_fps: Frames per second of the edit.
-        keys: The retiming keys (see are_retiming_keys).
+        keys: The retiming keys, finite and in order.
         is_known: Whether the keys could be read; otherwise constant speed is assumed.
     """
 
@@ -77,12 +76,6 @@ def playback_rate(strip: StripTiming, length: int, fps: float) -> float:
     shown = strip.content_end - strip.content_start
     natural = strip.keys[-1].index if len(strip.keys) > 1 else length
     return rate if abs(natural / rate - shown) < abs(natural - shown) or int(natural / rate) == shown else 1.0
-
-
-def are_retiming_keys(keys: Sequence[RetimingKey]) -> bool:
-    """Return whether keys can be Blender's: finite and in order."""
-    numbers = [number for key in keys for number in (key.index, key.factor)]
-    return all(map(math.isfinite, numbers)) and all(a.index <= b.index for a, b in pairwise(keys))
 
 
 def retimed(keys: Sequence[RetimingKey], position: float | np.float32) -> np.float32:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
 from .keyframes import Constant
@@ -57,15 +57,10 @@ class Field:
     precision: int = 2
     context: str = "*"
 
-    @property
-    def words(self) -> tuple[Any, ...]:
-        """The choices as the model has them."""
-        return tuple(self.word(word) for word, *_ in self.choices)
-
-    @staticmethod
-    def word(choice: str) -> int | str:
-        """Return a choice as the model has it: a word or a whole number."""
-        return int(choice) if choice.isdigit() else choice.lower()
+    @cached_property
+    def words(self) -> dict[str, int | str]:
+        """The choices as the model has them, words or whole numbers, by identifier."""
+        return {name: int(name) if name.isdigit() else name.lower() for name, *_ in self.choices}
 
 
 MISSING = dataclasses.MISSING
@@ -97,13 +92,9 @@ class Labelled:
         return dataclasses.field(default_factory=made or (lambda: default), metadata=said)
 
 
+@cache
 def fields_of(*kinds: type) -> dict[str, Field]:
     """Return the Fields of classes, by attribute name."""
-    return _fields_of(kinds)
-
-
-@cache
-def _fields_of(kinds: tuple[type, ...]) -> dict[str, Field]:
     said = {each.name: each.metadata for kind in kinds for each in dataclasses.fields(kind) if each.metadata}
     names: dict[str, dict[str, Any]] = {name: {"blender": name, "recipe": name} for name in said}
     return {name: Field(**names[name] | said[name]) for name in said}

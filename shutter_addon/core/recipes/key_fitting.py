@@ -117,7 +117,7 @@ def _shutter(
 def _said(part: Any, shown: range) -> dict[str, Any]:
     """Return a part's fields as a recipe has them: keys or constants over the frames `shown`."""
     said: dict[str, Any] = {}
-    for name, each in fields_of(type(part)).items():
+    for name, each in fields_of(part.__class__).items():
         value = getattr(part, name)
         if each.is_channel:
             is_keyed = each.keyed_in_recipe and isinstance(value, Samples)

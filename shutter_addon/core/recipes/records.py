@@ -102,7 +102,7 @@ class RegionKey(MoveKey):
 def _type_of(each: Field) -> Any:
     """Return the type of a field's value in a recipe."""
     if each.choices:
-        return Literal[each.words]
+        return Literal[tuple(each.words.values())]
     if isinstance(each.default, tuple):
         return tuple[_SHARE, _SHARE, _SHARE]
     if each.keyed_in_recipe:
