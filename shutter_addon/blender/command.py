@@ -11,7 +11,7 @@ from pathlib import Path
 
 from .. import features
 from ..compute.devices.device import NoDeviceError
-from ..core.messages import UserError
+from ..core.messages import UserError, of_file
 from ..media.files import check_name
 from .output import film_output
 from .rendering import render_job, render_settings
@@ -42,7 +42,7 @@ def main(argv: list[str]) -> int:
     except OSError as error:
         places = (getattr(arguments, name, None) for name in PLACES)
         place = next((place for place in places if isinstance(place, Path)), "")
-        return _refuse(film_output.in_words(error, place))
+        return _refuse(of_file(error, place))
     except RuntimeError as error:  # from Blender
         return _refuse(film_output.message(error))
     except Exception as error:

@@ -26,6 +26,9 @@ from .output import edit_feed
 from .rendering import invalidation, job_snapshots, render_job, sessions
 from .rendering.render_job import Where
 
+# Options of a Blender without user settings and network.
+_ALONE = "--background", "--factory-startup", "--offline-mode", "-noaudio"
+
 
 def _forget_file(*_) -> None:
     edit_feed.end()
@@ -153,9 +156,6 @@ def _uncaught(before: Callable, kind: type, error: BaseException, trace: Traceba
     recent_errors.exception(error)
     before(kind, error, trace)
 
-
-# Options of a Blender without user settings and network.
-_ALONE = "--background", "--factory-startup", "--offline-mode", "-noaudio"
 
 HANDLERS = {
     "load_pre": _forget_file,

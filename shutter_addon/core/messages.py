@@ -66,9 +66,11 @@ def sentence(text: object, longest: int = LONGEST) -> str:
     return f"{line[:head]} … {line[head + 3 - longest :]}"
 
 
-def of_file(error: OSError, place: str | os.PathLike[str] = "") -> str:
-    """Return the system's message about a file, after its name, or `place` if the error has none."""
-    return f"{os.fsdecode(error.filename or place)}: {error.strerror or error}"
+def of_file(error: Exception, place: str | os.PathLike[str] = "") -> str:
+    """Return an error's message. An OSError's begins with its file, or `place` if it names none."""
+    if isinstance(error, OSError):
+        return f"{os.fsdecode(error.filename or place)}: {error.strerror or error}"
+    return str(error)
 
 
 def signed(text: object) -> str:

@@ -96,9 +96,7 @@ def raised(check: Callable, *arguments) -> list[str]:
     """Return the message of the error that a check of `arguments` raises, if it does."""
     try:
         check(*arguments)
-    except UserError as error:
-        return [str(error)]
-    except OSError as error:
+    except (UserError, OSError) as error:
         return [of_file(error, arguments[0])]
     return []
 

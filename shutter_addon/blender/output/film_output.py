@@ -300,17 +300,10 @@ def _moved(part: Path, output: Path, scene: Scene, update: Callable[[], None], m
                     raise OutputError(f"{output / name}: could not be written whole; {why_short(part)}")
                 move(part / name, missing.pop(name))
         except (UserError, OSError) as error:
-            render_job.fail(in_words(error, output))
+            render_job.fail(of_file(error, output))
 
     with render_job.calling(bpy.app.handlers.render_write, moved):
         yield missing
-
-
-def in_words(error: Exception, place: Path | str) -> str:
-    """Return an error's message, beginning with its place, or `place` if an OSError has none."""
-    if isinstance(error, OSError):
-        return of_file(error, place)
-    return str(error)
 
 
 @contextmanager

@@ -23,7 +23,7 @@ from ....blender.interface.operator_bases import Named, operator, redraw
 from ....blender.interface.panel_parts import panel, sentence
 from ....blender.output import film_output
 from ....core import messages, revision
-from ....core.messages import EffectError, UserError
+from ....core.messages import EffectError, UserError, of_file
 from . import baked_film
 
 TICK = 0.5  # seconds between two looks at the job
@@ -74,7 +74,7 @@ def bake(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] |
             return None
         _bake.running = baked_film.start(self.edit, effect, self.effect_strip, film)
     except (film_output.OutputError, OSError) as error:
-        raise UserError(film_output.in_words(error, film.place)) from None
+        raise UserError(of_file(error, film.place)) from None
     main_thread.later(_look, TICK)
     return {"CANCELLED"}  # nothing to undo yet
 
