@@ -1,7 +1,7 @@
 """The way of a frame through the extension: its stops, which are the functions that make it, in the order in which they
 are first called; and how often it comes back to a room that it had left.
 
-A room is a folder of the extension, or of blender/, as docs/developers.md lists them."""
+A room is a folder of the extension: blender, compute, core, features or media."""
 
 import sys
 import threading
@@ -27,8 +27,7 @@ class Stop(NamedTuple):
 
 
 def _room(path: str) -> str:
-    parts = path.split("/")
-    return "/".join(parts[:2]) if parts[0] == "blender" and len(parts) > 2 else parts[0]
+    return path.partition("/")[0]
 
 
 @contextmanager

@@ -110,13 +110,13 @@ class Renderer:
         """
         if request.state.layers is None and (self._window is None or not self._window.is_open):
             self._kept_picture.clear()
-        with self.compositor.current():
-            return self._kept_picture.get(request.key, lambda: self._composed(request), quick=request.quick)
+        return self._kept_picture.get(request.key, lambda: self._composed(request), quick=request.quick)
 
     def _composed(self, request: Request) -> Handle:
         wanted_later = self._want(request)
         request = self.slid(request)
-        drawn = self._with_layers(request) if request.state.layers else self._plain(request)
+        with self.compositor.current():
+            drawn = self._with_layers(request) if request.state.layers else self._plain(request)
         self.source.want(wanted_later)
         return drawn
 
@@ -236,9 +236,9 @@ class Renderer:
         request = self.slid(request, known=True)
         if request.state.layers is None:
             request = self._exposing(request, self.labels(request))
-        unread, handed, shots = set[int](), set[int](), self.source.shots
+        unread, handed, reach, shots = set[int](), set[int](), self._reach(request), self.source.shots
         if shots is not None and request.state.options.stop_at_cuts:
-            unread, handed = shots.lacking(request.index, *self._reach(request)), shots.handed()
+            unread, handed = shots.lacking(request.index, *reach), shots.handed()
         shot = self.shot(request, known=True)
         missing = request.exposed_frames(shot).difference(held)
         missing |= self._guides.lacking(self._guiding(request, shot))

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator
 
 import numpy as np
 
-from ..core.frames.frame_source import TILE, FrameSource, Moment, Planes, chroma_step
+from ..core.frames.frame_source import TILE, FrameSource, Moment, Planes, as_rgba, chroma_step
 from ..core.model import windows
 from ..core.model.frame_state import Light, Options
 from ..core.stopping import kept
@@ -199,14 +199,13 @@ class Sums(Window):
         Returns:
             How it was sent (`accumulation`), and the arguments of the pass that adds it
         """
-        index, may_be_moment = frames[0], self.source.step > 1
-        frame = self.source.decoded(index) if self.device.takes_planes or may_be_moment else self.source.read(index)
-        if isinstance(frame, Planes):
+        frame = self.source.decoded(frames[0])
+        if isinstance(frame, Planes) and self.device.takes_planes:
             return "PLANES", self._send_planes(frame)
         if isinstance(frame, Moment):
             return "MOMENT", self._send_moments([frame, *self._evenly(frame, frames[1:])])
         own = self._own("frame", "rgba8")
-        sent = self.device.send(own, frame)
+        sent = self.device.send(own, as_rgba(frame))
         return "COLOURS" if sent is own else "NUMBERS", {"textures": {"frame": sent}}
 
     def _send_planes(self, frame: Planes) -> Given:

@@ -7,7 +7,7 @@ The rest looks up these names:
 
 - `SmoothSource`, `steps_for`, `CarriedFile`, `MarkedSubject`, `still_mask`: sources of frames and mattes.
 - `want_matte`, `next_needed`: mattes that previews miss, and the frame that needs a drawing.
-- `smooth_request`, `smooth_comes`, `advance_smooth`, `rest_smooth`: smooth pictures of previews.
+- `smooth_request`, `advance_smooth`, `rest_smooth`: smooth pictures of previews.
 - `note_streaks`, `note_tracking`: notes in previews; `notes`: notes in the panel.
 - `draw_new`, `draw_smooth`, `draw_tracking`, `draw_tracked`, `tracking_icon`: parts of panels.
 - `after_stroke`: called when the pen goes up.

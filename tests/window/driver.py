@@ -76,8 +76,8 @@ def video_editing_opened():
 def composing(previews):
     """Whether a first or a better picture is being made."""
     smooth = part("features.smooth.blender.smooth_previews")
-    coming = list(smooth._coming)  # private: pictures of all effects
-    return previews.looking.slices.last is not None or any(map(smooth.smooth_comes, coming))
+    coming = smooth._coming.values()  # private: pictures of all effects
+    return previews.looking.slices.last is not None or not all(each.is_over for each in coming)
 
 
 def play(story, seconds=STEP):

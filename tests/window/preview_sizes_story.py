@@ -3,9 +3,11 @@
 import json
 import subprocess
 import time
+from pathlib import Path
 
 import bpy
 import driver
+import frame_trace
 import story
 
 FRAME = 50
@@ -143,6 +145,12 @@ def kept_time():
     kept, edit.sync_mode = edit.sync_mode, "FRAME_DROP"
     edit.frame_set(1)
     yield from played(0.5)
+    package = Path(driver.part("compute.renderer").__file__).parents[1]
+    with frame_trace.traced(package, "VirtualShutterEngine.render", "_draw") as stops:
+        yield from driver.until(lambda: any(stop.function == "Quad.draw" for stop in stops), "a frame is drawn")
+        yield 0.5
+    back = frame_trace.returns(stops)
+    assert len(back) <= 8, back
     handler = bpy.types.SpaceSequenceEditor.draw_handler_add(note, (), "PREVIEW", "POST_PIXEL")
     yield 3.0
     bpy.types.SpaceSequenceEditor.draw_handler_remove(handler, "PREVIEW")

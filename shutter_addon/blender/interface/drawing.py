@@ -181,7 +181,7 @@ class Quad:
         shader = shader_of(name)
         shader.bind()
         for sampler, texture in textures.items():
-            shader.uniform_sampler(sampler, texture.gpu)
+            shader.uniform_sampler(sampler, texture)
         for constant, value in constants.items():
             (shader.uniform_float if isinstance(value, float) else shader.uniform_int)(constant, value)
         where = {"corner": self.view.on_region(corners).tolist(), "place": corners}

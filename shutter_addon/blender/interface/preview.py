@@ -131,10 +131,10 @@ def _show(context: Context, shown: Shown, decision: Decision | None, say: Say) -
         decision: what the engine was asked for.
     """
     try:
+        quad = Quad(context.region, shown)
         wanted = previews.for_drawing(context, shown, decision)
         if previews.is_going(context):
             main_thread.later(_redraw_when_still, _SOON)
-        quad = Quad(context.region, shown)
         try:
             if wanted.decision.is_late:
                 raise stopping.StoppedError
@@ -165,7 +165,7 @@ def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, s
         _show_source(quad, shown, renderer, request, wanted.left)
     if wanted.draws_result:
         texture = renderer.draw(replace(request, quick=previews.is_going(context), levels=True))
-        quad.draw("PICTURE", {"picture": texture}, wanted.left, 1.0, opacity=shown.strip.blend_alpha)
+        quad.draw("PICTURE", {"picture": texture.gpu}, wanted.left, 1.0, opacity=shown.strip.blend_alpha)
     colors = [shutter.color for shutter in shown.effect.shutters]
     if settings.view == "SCRIBBLES":
         _show_shares(quad, "SCRIBBLES", colors, renderer.drawn_labels(request), renderer, 0.7)
@@ -242,7 +242,7 @@ def _show_source(quad: Quad, shown: Shown, renderer: Renderer, request: Request,
     following = request.state.following
     moving = following and following.of([following.moving()[0]])
     plain = replace(request, state=FrameState(options=options, bars=still, following=moving), levels=True)
-    quad.draw("PICTURE", {"picture": renderer.draw(plain)}, 0.0, right, opacity=shown.strip.blend_alpha)
+    quad.draw("PICTURE", {"picture": renderer.draw(plain).gpu}, 0.0, right, opacity=shown.strip.blend_alpha)
 
 
 def _show_shares(
@@ -253,9 +253,8 @@ def _show_shares(
     rgba, size = np.ones((len(colors), 4), dtype=np.float32), (len(colors), 1)
     rgba[:, :3] = colors
     data = gpu.types.Buffer("FLOAT", rgba.size, rgba.reshape(-1))
-    side_by_side = gpu.types.GPUTexture(size, layers=1, format="RGBA32F", data=data)
-    palette = Texture(None, (*size, 1), "rgba32f", side_by_side)
-    textures = {"labels" if step == "SCRIBBLES" else "coefficients": texture, "palette": palette}
+    palette = gpu.types.GPUTexture(size, layers=1, format="RGBA32F", data=data)
+    textures = {"labels" if step == "SCRIBBLES" else "coefficients": texture.gpu, "palette": palette}
     quad.draw(step, textures, opacity=opacity, block=block, size=(source.width, source.height), **more)
 
 

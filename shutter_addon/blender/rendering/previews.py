@@ -146,9 +146,10 @@ def for_engine(context: Context, effect_scene: Scene) -> Decision | None:
     if seen and look:
         decision = looking.decision = _decide(context, seen, look, snapshot)
         is_told = context.window_manager.virtual_shutter.live and not decision.is_drawn
-        return replace(decision, stopped=_time_up(context, decision.request.key) if is_told else None)
+        return replace(decision, stopped=_time_up(context, decision.request) if is_told else None)
     detail = effect_source.FULL if look is None or looking.whole is not None else _detail(context, look)
-    return Decision(snapshot, frame, _best(context, snapshot, frame, detail))
+    request, _is_plain = _best(context, snapshot, frame, detail)
+    return Decision(snapshot, frame, request)
 
 
 def take_decision() -> Decision | None:
@@ -166,7 +167,6 @@ def for_drawing(context: Context, shown: Shown, decision: Decision | None) -> Dr
     settings, snapshot = context.window_manager.virtual_shutter, _snapshot(shown)
     if decision is None or decision.snapshot is not snapshot:
         decision = _decide(context, shown, _look(context, shown), snapshot)
-    decision = replace(decision, stopped=never if is_read(context) else _time_up(context, decision.request.key))
     request = _drafted(context, shown, decision.request)
     has_result = settings.view in RESULTS
     left = settings.split if settings.view == "SPLIT" else 0.0 if has_result else 1.0
@@ -176,6 +176,7 @@ def for_drawing(context: Context, shown: Shown, decision: Decision | None) -> Dr
     # Otherwise Blender shows the engine's picture among the other strips.
     draws_result = has_result and left < 1 and (decision.is_drawn or not _is_rendered(shown))
     renderer = sessions.of_drawing().renderer(request)
+    decision = replace(decision, stopped=never if is_read(context) else _time_up(context, decision.request))
     return Drawing(decision=decision, request=request, renderer=renderer, left=left, draws_result=draws_result)
 
 
@@ -193,8 +194,7 @@ def _look(context: Context, shown: Shown) -> Look:
 
 
 def _decide(context: Context, shown: Shown, look: Look, snapshot: Snapshot) -> Decision:
-    request = _requested(context, shown, snapshot, look)
-    is_plain = any(comes(snapshot.scene) for comes in features.each("smooth_comes"))
+    request, is_plain = _requested(context, shown, snapshot, look)
     source = sessions.of_drawing().renderer(request).source
     is_drawn = _is_drawn(context, shown, look, source, is_less=is_plain or is_going(context))
     return Decision(snapshot, shown.scene.frame_current, request, is_drawn, is_plain)
@@ -204,8 +204,8 @@ def _snapshot(shown: Shown) -> Snapshot:
     return invalidation.current(shown.scene, shown.effect, shown.strip, shown.scene.frame_current)
 
 
-def _requested(context: Context, shown: Shown, snapshot: Snapshot, look: Look) -> Request:
-    """Return the picture in the previews' detail, or in full while it is looked at so.
+def _requested(context: Context, shown: Shown, snapshot: Snapshot, look: Look) -> tuple[Request, bool]:
+    """Return, as _best, the picture in the previews' detail, or in full while it is looked at so.
 
     Another frame or a change of the effect ends full quality.
     """
@@ -220,14 +220,14 @@ def _requested(context: Context, shown: Shown, snapshot: Snapshot, look: Look) -
     return _best(context, snapshot, frame, _detail(context, look))
 
 
-def _best(context: Context, snapshot: Snapshot, frame: float, detail: effect_source.Detail) -> Request:
-    """Return the picture in a detail, or the plain one where the smooth one is not ready."""
+def _best(context: Context, snapshot: Snapshot, frame: float, detail: effect_source.Detail) -> tuple[Request, bool]:
+    """Return the picture in a detail, and whether it is the plain one because the smooth one is not ready."""
     render = sessions.of_drawing()
     if not is_read(context) and detail.smooth:
         for smooth_request in features.each("smooth_request"):
             return smooth_request(render, snapshot, frame, detail)
     features.call("rest_smooth")
-    return render.request(snapshot, frame, detail)
+    return render.request(snapshot, frame, detail), False
 
 
 def _detail(context: Context, look: Look) -> effect_source.Detail:
@@ -280,11 +280,12 @@ def _is_rendered(shown: Shown) -> bool:
     return shown.scene.render.sequencer_gl_preview == "RENDERED"
 
 
-def _time_up(context: Context, key: tuple) -> Slice:
+def _time_up(context: Context, request: Request) -> Slice:
     """Return a function that tells that a picture has taken so long that Blender has to handle events.
 
     The picture goes on in the next redraw.
     """
+    key = request.key
     if _is_playing(context):
         looking.slices.end()
         return looking.slices.next(key, _PLAYED, _PLAYED)

@@ -102,8 +102,8 @@ class _Coming:
 _coming: dict[int, _Coming] = {}  # by effect scene
 
 
-def smooth_request(render: RenderContext, snapshot: Snapshot, frame: float, detail: Detail) -> Request:
-    """Return the smooth request if its picture is ready, else the plain one.
+def smooth_request(render: RenderContext, snapshot: Snapshot, frame: float, detail: Detail) -> tuple[Request, bool]:
+    """Return the smooth request if its picture is ready, else the plain one and whether the smooth one follows.
 
     Raises:
         effect_source.FAULTS: There is no picture.
@@ -112,7 +112,7 @@ def smooth_request(render: RenderContext, snapshot: Snapshot, frame: float, deta
     plain = render.request(snapshot, frame, replace(detail, smooth=False))
     if steps == 1:
         _coming.pop(snapshot.scene, None)
-        return plain
+        return plain, False
     coming, key = before, (plain.key, steps_key(snapshot))
     asked = render, snapshot, frame, detail
     if coming is None or coming.key != key:
@@ -122,16 +122,11 @@ def smooth_request(render: RenderContext, snapshot: Snapshot, frame: float, deta
     if (request := coming.request()) is not None:
         coming.is_over = coming.is_alone or coming.made == request.key or not coming.lacks(request)
         if coming.is_over:
-            return request
+            return request, False
     coming.is_over = coming.fault is not None
     if before is not None and before is not coming:
         before.rest()
-    return plain
-
-
-def smooth_comes(scene: int) -> bool:
-    """Tell whether a smooth picture of an effect scene is being made."""
-    return scene in _coming and not _coming[scene].is_over
+    return plain, not coming.is_over
 
 
 def advance_smooth(seconds: float) -> None:
