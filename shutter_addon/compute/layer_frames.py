@@ -15,7 +15,7 @@ from ..core.caches import RecentValues
 from ..core.frames import light
 from ..core.frames.frame_source import Decoded, FrameSource, Moment, Pair, SourceWrapper, as_rgba
 from ..core.model.frame_state import FrameState, Layers, Options
-from ..core.model.mattes import FileFrame, MatteReader, Ramp
+from ..core.model.mattes import FileFrame, Matte, MatteReader, Ramp
 from ..core.pixels import compositor, layering
 from ..core.stopping import kept
 
@@ -125,17 +125,18 @@ class LayerMattes:
     """The mattes of a source's layers, cached.
 
     Args:
-        size: (w, h) of the pictures
+        source: the footage
         solve: returns coefficients (N, h, w) float32 of a state (Layers.scribbles) at a source frame
         reader: reads the values of mattes. None: there are none.
     """
 
     def __init__(
-        self, size: tuple[int, int], solve: Callable[[FrameState, int], np.ndarray], reader: MatteReader | None
+        self, source: FrameSource, solve: Callable[[FrameState, int], np.ndarray], reader: MatteReader | None
     ) -> None:
-        self._size, self._solve, self._reader = size, solve, reader
+        self._source, self._solve, self._reader = source, solve, reader
+        self._size = source.width, source.height
         self._kept: RecentValues[Hashable, np.ndarray] = RecentValues()
-        self._most = max(KEPT_BYTES // (2 * size[0] * size[1]), 16)
+        self._most = max(KEPT_BYTES // (2 * source.width * source.height), 16)
 
     def of(self, layers: Layers, frame: int) -> list[np.ndarray]:
         """Return the mattes (H, W) float32, 0 … 1, of all layers in a source frame, times their opacities."""
@@ -164,14 +165,25 @@ class LayerMattes:
         place = self._place(layers, frame)
         drawn, matte = layers.scribbles[place], layers.mattes[place][layer]
         if matte is not None:
-            reader = self._reader
-            assert reader is not None
-            moves = frame if isinstance(matte.content, FileFrame) else None
-            key = matte.content, matte.feather, matte.invert, moves
-            value = self._get(key, lambda: reader.values((matte,), frame, 1)[0][1])
-        elif drawn is not None:
-            value = self._drawn(drawn, frame, layer)
-        return value.astype(np.float32) / np.float32(_WHOLE)
+            return self._of_content(matte, frame)
+        assert drawn is not None
+        return _fraction(self._drawn(drawn, frame, layer))
+
+    def _of_content(self, matte: Matte, frame: int) -> np.ndarray:
+        """Return a matte's values (H, W) float32. A file's frames move with the picture at moments between them."""
+        reader, content = self._reader, matte.content
+        assert reader is not None
+        key = content, matte.feather, matte.invert, frame if isinstance(content, FileFrame) else None
+        moves = isinstance(content, FileFrame) and content.time is None and self._source.step > 1
+        moment = self._source.decoded(frame) if moves else None
+        if not isinstance(moment, Moment):
+            return _fraction(self._get(key, lambda: reader.values((matte,), frame, 1)[0][1]))
+
+        def moved() -> np.ndarray:
+            ends = [self._of_content(matte, number * self._source.step) for number in moment.pair]
+            return moment.between.values(moment, *ends)
+
+        return _fraction(self._get(key, moved))
 
     def behind(self, layers: Layers, frame: int) -> np.ndarray:
         """Return how much (H, W) float32 of what lies behind all layers a source frame shows."""
@@ -204,6 +216,11 @@ class LayerMattes:
         self._kept.clear()
         if self._reader is not None:
             self._reader.close()
+
+
+def _fraction(values: np.ndarray) -> np.ndarray:
+    """Return cached values as float32, 0 … 1."""
+    return values.astype(np.float32) / np.float32(_WHOLE)
 
 
 T = TypeVar("T")

@@ -46,8 +46,7 @@ class LayeredRenderer:
         self._compositor, self._stages, self._source = compositor, stages, source
         self.recent = layer_frames.RecentFrames(source)
         noted = NotedSource(self.recent, guides)
-        size = source.width, source.height
-        self.mattes = layer_frames.LayerMattes(size, lambda state, frame: solve(self.recent, state, frame), mattes)
+        self.mattes = layer_frames.LayerMattes(self.recent, lambda *asked: solve(self.recent, *asked), mattes)
         self._colors = layer_frames.LayerColors(noted, self.recent, self.mattes)
         self._layers: Layers | None = None
         self._windows: dict[tuple, Handle] = {}

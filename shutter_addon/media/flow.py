@@ -107,6 +107,22 @@ class Between:
             frame = np.where(level_of == level, shown, frame)
         return _decoded(frame, self.ends[0].dtype, self._transfer, self._alpha)
 
+    def values(self, moment: Moment, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        """Return values (H, W) at a moment, given those of both frames, float32, which move like the frames."""
+        (height, width), keys = first.shape, len(moment.vectors) + 1
+        key = min(max(round(moment.number * keys / moment.steps), 1), keys - 1)
+        flags, scale = (
+            cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+            np.array([[1 / STEP, 0, 0], [0, 1 / STEP, 0]], np.float32),
+        )
+        vectors = moment.vectors[key - 1].astype(np.float32)
+        spread = cv2.warpAffine(vectors, scale, (width, height), flags=flags, borderMode=cv2.BORDER_REPLICATE)
+        share, paths = key / keys, (spread[..., :2] - ZERO) / np.float32(UNIT)
+        places = grid(height, width) - np.float32(share) * paths
+        before, after = look(first, places), look(second, places + paths)
+        late, early = share * (spread[..., 3] + 13), (1 - share) * (spread[..., 2] + 13)  # as _mixed weighs them
+        return before + late / (late + early) * (after - before)
+
     def _light(self, vectors: np.ndarray, key: int) -> np.ndarray:
         """Return the linear light of a key moment, (H, W, 3 or 4) float32."""
         keys = len(vectors) + 1

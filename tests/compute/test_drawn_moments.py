@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from test_composition import LEVEL, Footage, composed, few_pieces
+from test_layered import with_layers
 
 from shutter_addon.compute import running_sums
 from shutter_addon.compute.renderer import Renderer
@@ -13,8 +14,10 @@ from shutter_addon.core.frames import light
 from shutter_addon.core.model import shutters
 from shutter_addon.core.model.frame_state import FrameState, Options
 from shutter_addon.features.smooth.smooth import SmoothSource
+from shutter_addon.media.matte_values import MatteValues
 
 STEPS = 4
+ALONE = FrameState(Options(1), np.ones((3, 1)))
 ROUNDED = 0.6  # levels: half of one, and what a GPU's pow adds to its argument (0.062 on an NVIDIA H100)
 
 
@@ -59,6 +62,26 @@ def test_a_moment_alone(device, size, steps):
         apart = np.abs(light.to_encoded(picture.astype(np.float64)) - light.to_encoded(wanted))
         assert apart.max() <= 1.1 * LEVEL
         assert (apart > ROUNDED * LEVEL).mean() < 0.1  # OpenCV rounds what lies halfway by weights of its own
+
+
+def test_a_layers_matte_moves_with_its_subject(device):
+    """At moments, as it does from filmed frame to filmed frame."""
+    height, width = 96, 160
+    far, near = np.random.default_rng(4).random((2, 16, 40, 1)).repeat(6, 1).repeat(6, 2)
+    x, y = np.meshgrid(np.arange(width), np.arange(height))
+
+    def matte(time):
+        return np.clip(25 - np.hypot(x - 40 - 8 * time, y - height / 2), 0, 1)
+
+    discs = np.stack([matte(k) for k in range(3)])
+    moved = np.stack([np.roll(near, 8 * k, axis=1) for k in range(3)])[:, :, :width]
+    mixed = far[:, :width] + discs[..., None] * (moved - far[:, :width])
+    frames = np.concatenate([mixed, mixed, mixed, np.ones_like(mixed)], axis=3) * 255
+    source = SmoothSource(Footage(np.rint(frames).astype(np.uint8)), 4)
+    renderer = Renderer(device, source, MatteValues(width, height, 4))
+    for index in (6, 7):
+        (found,) = renderer.layer_mattes(Request(index, with_layers(ALONE, discs)[0]))
+        assert np.abs(found - matte(index / 4)).sum() < 0.5 * np.abs(matte(1) - matte(index / 4)).sum()
 
 
 def repeating(steps):

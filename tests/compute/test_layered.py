@@ -14,7 +14,7 @@ from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer, open_compositor, open_gl
 from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
-from shutter_addon.core.frames.frame_source import as_rgba
+from shutter_addon.core.frames.frame_source import Moment, as_rgba
 from shutter_addon.core.model import windows
 from shutter_addon.core.model.frame_state import Following, FrameState, Layers, Options
 from shutter_addon.core.model.mattes import FileFrame, Matte
@@ -327,6 +327,9 @@ def test_moments_lie_between_filmed_frames_with_the_colours_of_a_layer(device, m
             k, after = divmod(number, step)
             between = Between(*filmed.frames[k : k + 2]).with_ends(*ends[k : k + 2]) if after else None
             frames.append(as_rgba(between.moment((k, k + 1), after, step)) if after else ends[k])
+            if after and isinstance(source.decoded(number), Moment):
+                known = matte[number - after :: step].astype(np.float32)
+                matte[number] = np.rint(between.values(source.decoded(number), *known[:2]) * 65535) / 65535
         parts.append(Footage(np.stack(frames), filmed.transfer))
     without = dataclasses.replace(moment, options=dataclasses.replace(moment.options, decontaminate=False))
     expected, enough, _covered = formula(device, parts, without, [matte])

@@ -124,6 +124,9 @@ class Pair(Protocol):
     def rgba(self, moment: Moment) -> np.ndarray:
         """Make the frame of a moment, as FrameSource.read gives it."""
 
+    def values(self, moment: Moment, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        """Return values (H, W) at a moment, given those of both frames, float32, which move like the frames."""
+
 
 @dataclass(frozen=True)
 class Moment:
