@@ -1,8 +1,8 @@
-"""Smooth pictures of previews, which follow plain ones, so that drawing never waits for optical flow.
+"""Make pictures with moments between frames ("smooth") for previews, after plain ones, so that drawing never waits.
 
-A preview first shows the plain exposure of filmed frames. Meanwhile a thread makes the moments between them, and the
-smooth picture is composed in slices of time from those that are ready. Then it replaces the plain one. A moving
-playhead or a new stroke ends this.
+A preview first shows the exposure of the footage's frames alone, the plain picture. Meanwhile a thread makes the
+moments between them by optical flow, and the smooth picture is composed in slices of time from those that are ready.
+Then it replaces the plain one. A moving playhead or a new stroke ends this.
 """
 
 from __future__ import annotations
@@ -29,15 +29,16 @@ class _Coming:
     """A smooth picture that is being made.
 
     Attributes:
-        key: Key of the plain picture, and steps_key.
-        asked: What was last asked for: context, snapshot, timeline frame and detail, at the time `since`.
-        steps: Finds the steps.
+        key: Key of the plain picture, and effect_source.steps_key.
+        asked: What was last asked for: context, snapshot, timeline frame and detail.
+        steps: Finds the number of moments on a thread; None: not begun.
+        since: When it was last asked for (time.monotonic).
         is_asked: Whether it was asked for since the last look.
         is_seen: Whether the plain picture was drawn.
         is_over: Whether nothing is left to do.
         is_alone: Whether the device has no room for both pictures.
-        made: Key of the composed request.
-        fault: Why there is no picture.
+        made: Key of the composed request; None: not composed.
+        fault: Why there is no picture; None: no error.
         slices: Slices of time in which it is composed.
     """
 
@@ -54,7 +55,7 @@ class _Coming:
     slices: Slices = field(default_factory=Slices)
 
     def request(self) -> Request | None:
-        """Return the smooth request; None: its steps or its renderer are missing."""
+        """Return the request for the smooth picture; None: it is not known how many moments, or no renderer is open."""
         render, snapshot, frame, detail = self.asked
         if known_steps(snapshot) is None or render.session.open_renderer(SourceKey.of(snapshot, detail)) is None:
             return None
@@ -65,16 +66,20 @@ class _Coming:
         return render.request(snapshot, frame, replace(detail, smooth=False))
 
     def lacks(self, request: Request) -> bool:
-        """Tell whether frames have to be read for a picture."""
+        """Tell whether frames have to be read before a picture can be made."""
         return bool(self.asked[0].renderer(request).missing(request))
 
     def rest(self) -> None:
-        """Stop the thread's work."""
+        """Have the thread stop making moments."""
         if (request := self.request()) is not None:
             self.asked[0].renderer(request).source.want(())
 
     def advance(self, seconds: float) -> float:
-        """Compose the picture for some seconds. Return in how many seconds to go on."""
+        """Do a part of the work: find the number of moments, or compose the picture for some seconds.
+
+        Returns:
+            In how many seconds to redraw and go on.
+        """
         render, snapshot, frame, detail = self.asked
         if not self.is_seen:
             self.is_seen = True
@@ -103,10 +108,10 @@ _coming: dict[int, _Coming] = {}  # by effect scene
 
 
 def smooth_request(render: RenderContext, snapshot: Snapshot, frame: float, detail: Detail) -> Request:
-    """Return the smooth request if its picture is ready, else the plain one.
+    """Return the request for the smooth picture if that is ready, else for the plain one. Begin to make the smooth one.
 
     Raises:
-        effect_source.FAULTS: There is no picture.
+        effect_source.FAULTS: The effect cannot be shown.
     """
     steps, before = known_steps(snapshot), _coming.get(snapshot.scene)
     plain = render.request(snapshot, frame, replace(detail, smooth=False))
@@ -130,15 +135,19 @@ def smooth_request(render: RenderContext, snapshot: Snapshot, frame: float, deta
 
 
 def smooth_comes(scene: int) -> bool:
-    """Tell whether a smooth picture of an effect scene is being made."""
+    """Tell whether a smooth picture is being made.
+
+    Args:
+        scene: session_uid of the effect scene.
+    """
     return scene in _coming and not _coming[scene].is_over
 
 
 def advance_smooth(seconds: float) -> None:
-    """Compose the smooth pictures whose plain ones were drawn, for some seconds each.
+    """Go on with the smooth pictures whose plain ones were drawn, for some seconds each.
 
     Raises:
-        effect_source.FAULTS: There is no picture.
+        effect_source.FAULTS: One cannot be made.
     """
     for scene, coming in list(_coming.items()):
         if time.monotonic() > coming.since + _UNSEEN:
@@ -159,12 +168,12 @@ def advance_smooth(seconds: float) -> None:
 
 
 def rest_smooth() -> None:
-    """Stop making smooth pictures."""
+    """Stop making smooth pictures, because the playhead moves or the user draws."""
     while _coming:
         _coming.popitem()[1].rest()
 
 
 def forget_pictures() -> None:
-    """Wait for threads, and forget everything: when a file is loaded or the extension is disabled."""
+    """Wait for threads and forget all smooth pictures, when a file is loaded or the extension is disabled."""
     wait([coming.steps for coming in _coming.values() if coming.steps is not None])
     _coming.clear()
