@@ -111,7 +111,7 @@ def _prepare(film: int, in_job: bool) -> bool:
 
     Args:
         film: session_uid of the rendered scene.
-        in_job: Whether a job of the window renders, which then gets its snapshots now.
+        in_job: Whether a thread of Blender's window renders, for which all effects are read now (job_snapshots).
 
     Returns:
         True, which tells the waiting thread that it is done.

@@ -93,12 +93,12 @@ def refollow(effect: PropertyGroup, old: str, new: str | None) -> None:
 
 
 def bars(shutter: PropertyGroup) -> np.ndarray:
-    """Return a shutter's stored bars, float64 (L,): how much each frame counts, without regard to keys."""
+    """Return a shutter's stored bars, float64 (L,): how much each frame of its window counts, apart from keys."""
     return numbers(shutter.bars, "weight").astype(np.float64)
 
 
 def fit_bars(effect: PropertyGroup) -> None:
-    """Fit all shutters' bars after the window's length or position has changed.
+    """Fit all shutters' bars (how much each frame counts) after the window's length or position has changed.
 
     A shutter whose bars are still those of its preset gets the preset's bars for the new window. Any other loses its
     preset; its bars, at keys too, are resampled, which keeps their shape and their share of the light.
@@ -114,7 +114,7 @@ def fit_bars(effect: PropertyGroup) -> None:
 
 
 def count_filmed(effect: PropertyGroup) -> None:
-    """Convert an effect of format 1, whose bars counted moments between filmed frames, to bars of filmed frames.
+    """Convert an effect of format 1, whose bars counted moments between frames, too, to bars of the footage's frames.
 
     Raises:
         EffectError: A value is out of range.
@@ -147,10 +147,11 @@ def preset_of(effect: PropertyGroup, index: int) -> str:
 
 
 def _change_bars(effect: PropertyGroup, index: int, change: Callable[..., np.ndarray]) -> None:
-    """Replace a shutter's bars by `change(bars)`, which may change their number, also at each key.
+    """Replace a shutter's bars (how much each frame counts) by `change(bars)`, also at each key.
 
     Args:
-        change: Takes and returns an array (L,) of bars.
+        index: Of the shutter.
+        change: Takes the bars (L,) and returns new ones, maybe of another number.
     """
     shutter = effect.shutters[index]
     scene, path = effect.id_data, f"{effect.path_from_id()}.shutters[{index}].bars"
@@ -169,9 +170,10 @@ def _change_bars(effect: PropertyGroup, index: int, change: Callable[..., np.nda
 
 
 def _bars_keyed(old: np.ndarray, keyed: dict[int, FCurve], frame: float) -> np.ndarray:
-    """Return the bars (L,) at a timeline frame: `old`, with those that F-curves drive evaluated, at least 0.
+    """Return a shutter's bars (L,) at a timeline frame: the values of F-curves, at least 0, and `old` for the others.
 
     Args:
+        old: The stored bars (L,).
         keyed: F-curves by the index of their bar.
     """
     weights = old.copy()

@@ -38,7 +38,12 @@ def every(item: ID) -> list[Path]:
 
 
 def absolute(owner: ID | Strip, path: str) -> Path:
-    """Return the absolute path of a file that a data-block or a strip names."""
+    """Return the absolute path of a file that a data-block or a strip names.
+
+    Args:
+        owner: The data-block or strip; a path that begins with // is relative to the .blend file that has it.
+        path: As stored.
+    """
     library = owner.library if isinstance(owner, bpy.types.ID) else owner.id_data.library
     return Path(bpy.path.abspath(path, library=library))
 

@@ -31,7 +31,7 @@ _MOMENTS = 16  # steps from a filmed frame to the next
 
 
 def content(sampling: Sampling, region: PropertyGroup, moves: Moves) -> Channel:
-    """Return a channel of what a matte or ramp region shows: files, a mask or a gradient, by timeline frame.
+    """Return what a matte or ramp region shows over time: files, a mask or a gradient.
 
     Args:
         moves: The region's motion, which places a gradient.
@@ -116,7 +116,7 @@ def image_file(region: PropertyGroup) -> MatteFile:
 def filmed_frames(sampling: Sampling) -> dict[float, int]:
     """Return which frame of the source's footage, from 0, is shown at each timeline frame that is sampled.
 
-    Between two filmed frames, the earlier one counts.
+    With *Smooth*, a time between two frames of the footage counts as the first of them.
 
     Raises:
         EffectError, MediaError: The effect has no source strip, or its movie cannot be read.

@@ -1,6 +1,7 @@
-"""Sample an effect's properties and F-curves at timeline frames, as channels: values over time, without Blender's data.
+"""Sample an effect's properties and F-curves at timeline frames, as plain data that does not need Blender any more.
 
-To be called on Blender's main thread only.
+A property becomes a channel: an object whose `at(frame)` gives the property's value at a sampled frame. To be called on
+Blender's main thread only.
 """
 
 from collections.abc import Callable, Collection
@@ -38,7 +39,7 @@ def value(owner: PropertyGroup, field: Field, number: float | None = None) -> An
     """Return the value of a property as the model has it: words in place of enum items, for example.
 
     Args:
-        field: The model's field for the property; it does not change from frame to frame (no channel).
+        field: The model's field for the property, of a kind whose value is no channel.
         number: What the property's F-curve says, in place of the property's own value.
 
     Raises:
@@ -86,7 +87,7 @@ class Sampling:
         return self.effect.path_from_id()
 
     def over(self, keyed: object, at: Callable[[float], object], keys: tuple = ()) -> Channel:
-        """Return a channel of `at(frame)`: its values at all frames if it is keyed, else a constant.
+        """Return `at(frame)` as a channel (values over time): sampled at all frames if it is keyed, else constant.
 
         A UserError at one frame is kept, and raised when that frame's value is asked for.
 
@@ -100,7 +101,7 @@ class Sampling:
         return keyframes.Samples({frame: tried(at, frame) for frame in self.frames}, keys)
 
     def channel(self, owner: PropertyGroup, path: str, name: str, change: Callable = lambda value: value) -> Channel:
-        """Return the channel of a float property or vector.
+        """Return the values over time (a channel) of a float property or vector.
 
         Args:
             owner: The struct that has the property.
@@ -130,7 +131,7 @@ class Sampling:
         }
 
     def moves(self, moving: PropertyGroup, path: str) -> model.Moves:
-        """Return the motion of a region or the camera: channels of location, rotation in degrees, and scale.
+        """Return the motion of a region or the camera: location, rotation in degrees, and scale over time.
 
         Args:
             path: Data path of `moving` from the scene.
@@ -143,7 +144,7 @@ class Sampling:
 
     @cached_property
     def placement(self) -> Channel:
-        """The channel of the matrix (3, 3) from the sequencer's image space to fractions of the effect strip's picture.
+        """Over time, the matrix (3, 3) from the sequencer's image space to fractions of the effect strip's picture.
 
         Its value is None where the strip is too small to be seen. Without a strip it is None at all frames.
         """
@@ -161,7 +162,7 @@ class Sampling:
 
     @cached_property
     def time(self) -> Channel | None:
-        """The channel of the source frame that *Custom Time* shows, and whether it runs backward; None: it is off.
+        """Over time, the source frame that *Custom Time* shows, and whether it runs backward; None: it is off.
 
         For shutters whose length is *Timeline*, it is sampled half a frame before and after each frame as well.
         """

@@ -116,7 +116,7 @@ def _baked_part(scene: Scene, strip: Strip) -> Any:
 
 
 def of_bake(scene: Scene, strip: Strip) -> list:
-    """Return all strips with the same bake identity as a strip, itself included: effect strips and baked ones."""
+    """Return all strips that belong to the same bake as a strip, itself included: effect strips and baked strips."""
     identity = strip.virtual_shutter_bake.identity
     found = scene.sequence_editor.strips_all if identity else ()
     return [other for other in found if other.virtual_shutter_bake.identity == identity]

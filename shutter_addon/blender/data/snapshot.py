@@ -38,7 +38,7 @@ class Snapshot:
         origin: Timeline frame at which the effect scene's frame 0 would be shown.
         first: First timeline frame of the strip.
         film: Frame step and last frame of the scene whose sequencer is rendered.
-        frames: Timeline frames at which channels were sampled.
+        frames: Timeline frames at which keyed properties were sampled.
         effect: Shutters, regions and options.
         source: The footage, and how it is read.
         timing: Which frame of the footage is shown when; None: the effect's *Custom Time* says so.
@@ -88,7 +88,7 @@ def take(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames) -> S
 
 
 def read(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames) -> model.Effect:
-    """Return an effect as the model has it, with channels sampled at timeline frames.
+    """Return an effect as the model has it, with keyed properties sampled at timeline frames.
 
     What is wrong at one frame only is raised when that frame's values are asked for.
 
@@ -157,7 +157,7 @@ def _followed(shutter: PropertyGroup, regions: Sequence[model.AnyRegion], camera
 
 
 def bars_at(scene: Scene, effect: PropertyGroup, index: int, frame: float) -> np.ndarray:
-    """Return the bars (L,) of a shutter at a timeline frame, interpolated between keys.
+    """Return a shutter's bars (how much each frame counts, (L,)) at a timeline frame, interpolated between keys.
 
     Args:
         index: Of the shutter.
@@ -253,7 +253,7 @@ def check_counts(effect: PropertyGroup) -> None:
 
 
 def _options(sampling: Sampling) -> keyframes.Channel:
-    """Return the channel of an effect's options. It raises EffectError at a frame where one is out of range."""
+    """Return an effect's options over time. Asked for a frame at which one is out of range, they raise EffectError."""
     fields = fields_of(Options).items()
     found = {name: sampling.curves.find(f"{sampling.path}.{name}") for name, field in fields if field.keyed}
     keyed = {name: curve for name, curve in found.items() if curve}
@@ -269,7 +269,8 @@ def _shutter(sampling: Sampling, index: int, options: keyframes.Channel) -> mode
     """Return a shutter as the model has it, except for what its exposure follows.
 
     Args:
-        options: The effect's channel of options, for the window's length.
+        index: Of the shutter.
+        options: The effect's options over time, which give the window's length.
     """
     path, shutter = f"{sampling.path}.shutters[{index}]", sampling.effect.shutters[index]
     bars = sampled.tried(_bars, sampling, path, shutter, options)
@@ -282,11 +283,11 @@ def _shutter(sampling: Sampling, index: int, options: keyframes.Channel) -> mode
 
 
 def _bars(sampling: Sampling, path: str, shutter: PropertyGroup, options: keyframes.Channel) -> keyframes.Bars:
-    """Return a shutter's bars over time.
+    """Return a shutter's bars (how much each frame counts) over time.
 
     Args:
         path: Data path of the shutter from the scene.
-        options: The effect's channel of options, for the window's length.
+        options: The effect's options over time, which give the window's length.
 
     Raises:
         EffectError: The bars are not as many as the window is long.
@@ -310,7 +311,7 @@ def _bars(sampling: Sampling, path: str, shutter: PropertyGroup, options: keyfra
 
 
 def _bars_over(shutter: PropertyGroup, keyed: dict[int, FCurve], frames: Frames) -> dict[float, np.ndarray | UserError]:
-    """Return a shutter's bars (L,) at each frame, or the error where one of them is out of range.
+    """Return a shutter's bars (L,), how much each frame counts, by timeline frame; an error where one is out of range.
 
     Args:
         keyed: F-curves by the index of their bar.

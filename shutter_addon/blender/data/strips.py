@@ -27,7 +27,7 @@ IN_CODE_VALUES = 1 + 2**-23
 
 
 def is_carried(region: PropertyGroup) -> bool:
-    """Tell whether a region's mattes are tracked through the footage: a subject, or an outline that is not linear."""
+    """Tell whether a region is a subject, or an outline that is tracked from drawing to drawing through the footage."""
     return region.kind == "SUBJECT" or (region.kind == "OUTLINE" and region.between != "STRAIGHT")
 
 

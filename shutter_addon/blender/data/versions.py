@@ -81,7 +81,7 @@ def _footage_files(scene: Scene) -> Iterator[list[Path]]:
 def digests(files: list[Path]) -> list[bytes | None]:
     """Return a digest of each file's contents; None for a file that is missing or unreadable.
 
-    They are read in parallel. Of many large files, only blocks are read.
+    They are read in parallel. If there are more than _FEW, only blocks of larger files are read.
     """
     whole = derived.WHOLE if len(files) <= _FEW else _BLOCKS
     with threads.pool(_READERS) as pool:

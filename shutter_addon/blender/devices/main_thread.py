@@ -208,7 +208,9 @@ def _called(function: Callable[[], T]) -> Future[T]:
 
 
 def look() -> bool:
-    """Make calls of other threads on the main thread for a moment, if there are any or some came lately.
+    """Make the calls that other threads wait for, on the main thread, for _LEAST to _MOST seconds.
+
+    Nothing is done if no call waits and none came lately.
 
     Returns:
         Whether to call this again at once.

@@ -85,7 +85,7 @@ def choose_source(effect: PropertyGroup, strip: Strip, source: Strip) -> None:
 
 
 def own_source(source: Strip, shown: list[Shown]) -> None:
-    """Give a source strip a new, unique identity, and enter that in all effects that use the strip.
+    """Give a source strip a new, unique identity (a text), and store that in all effects that use the strip.
 
     Args:
         shown: All effects with their strips and sources.
@@ -171,11 +171,11 @@ def new_footage(level: StripsTopLevel, name: str, files: list[str], channel: int
 
 
 def new_effect_scene(scene: Scene, identity: str, name: str, size: tuple[int, int]) -> Scene:
-    """Add an effect scene, which our engine renders, with a camera and an empty annotation.
+    """Add an effect scene, which the engine of this extension renders, with a camera and an empty annotation.
 
     Args:
         scene: The scene that will have the effect; gives the frame rate.
-        identity: What effect, strip and scene know each other by.
+        identity: Unique text, which effect, strip and effect scene store to find each other.
         size: Width and height of the footage in pixels.
     """
     effect_scene = bpy.data.scenes.new(name)

@@ -1,4 +1,4 @@
-"""Edit a shutter's bars: set, key and unkey them, and read them at the current frame."""
+"""Edit a shutter's bars (how much each frame of its window counts): set, key and unkey them, and read them."""
 
 from collections.abc import Sequence
 from contextlib import suppress
@@ -20,7 +20,7 @@ def summary(weights: np.ndarray, combine: str = "AVERAGE") -> str:
     """Return a text for the user about a shutter's bars, such as "180° (4 of 8 frames)".
 
     Args:
-        weights: The bars (L,).
+        weights: The bars (L,): how much each frame counts.
         combine: An item of choices.COMBINES. Other than for "AVERAGE", the text says how many frames are combined.
     """
     if not np.any(weights):
@@ -35,13 +35,12 @@ def summary(weights: np.ndarray, combine: str = "AVERAGE") -> str:
 
 
 def told(scene: Scene, effect: PropertyGroup, strip: Strip, weights: np.ndarray) -> str:
-    """Return a text for the user about the active shutter's bars.
+    """Return a text for the user about the active shutter's bars. It is kept until something changes.
 
-    It is `summary`, or for an exposure whose length varies, how many frames it is open for at the current frame. It is
-    kept until something changes.
+    If the exposure's length varies, it says how many frames are open at the current frame; otherwise it is `summary`.
 
     Args:
-        weights: The bars (L,).
+        weights: The bars (L,): how much each frame counts.
     """
     index, frame = effect.active_shutter, scene.frame_current
     shutter = effect.shutters[index]
@@ -56,7 +55,11 @@ def told(scene: Scene, effect: PropertyGroup, strip: Strip, weights: np.ndarray)
 
 
 def set_bars(shutter: PropertyGroup, weights: Sequence[float] | np.ndarray) -> None:
-    """Set the weights of a shutter's bars to `weights` (L,), leaving out those that have the value already."""
+    """Set the weights of a shutter's bars, except those that have the value already.
+
+    Args:
+        weights: (L,): how much each frame counts.
+    """
     for bar, weight in zip(shutter.bars, weights, strict=True):
         if bar.weight != np.float32(weight):
             bar.weight = weight
@@ -68,11 +71,11 @@ def auto_key(context: Context) -> bool:
 
 
 def paint(effect: PropertyGroup, index: int, weights: Sequence[float] | np.ndarray, key: bool = False) -> None:
-    """Set a shutter's bars at the current frame, and their number.
+    """Set how many bars a shutter has, and their weights at the current frame.
 
     Args:
         index: Of the shutter.
-        weights: The bars (L,).
+        weights: (L,): how much each frame counts.
         key: Insert keyframes for them.
     """
     shutter = effect.shutters[index]
@@ -116,7 +119,7 @@ def unkey_bars(effect: PropertyGroup, index: int) -> bool:
 
 
 def shown(effect: PropertyGroup, index: int) -> tuple[np.ndarray, list[str]]:
-    """Return what the bar editor draws: a shutter's bars (L,) now, and the state of each (key_state).
+    """Return what the bar editor draws of a shutter at the current frame: bars (L,) and their states (key_state).
 
     It is kept until something changes.
     """
@@ -145,7 +148,7 @@ def _state(curve: FCurve | None, value: float, scene: Scene) -> str:
 
 
 def bars_now(effect: PropertyGroup, index: int) -> np.ndarray:
-    """Return the bars (L,) that the picture at the current frame uses, interpolated between keyframes.
+    """Return a shutter's bars (L,) as the picture at the current frame uses them, interpolated between keyframes.
 
     Bars that were changed and not keyed yet are returned as stored.
 

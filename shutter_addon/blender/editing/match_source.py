@@ -169,10 +169,10 @@ def places(effect: PropertyGroup, strip: Strip) -> list[np.ndarray | None]:
 
 
 def put_back(effect: PropertyGroup, strip: Strip, before: list[np.ndarray | None]) -> None:
-    """Move an effect's strokes back to the place on the picture that they had before it was moved.
+    """Move an effect's strokes so that they are where they were on the picture, after the picture was moved.
 
     Args:
-        before: What `places` returned before.
+        before: What `places` returned before that.
     """
     for drawing, old, new in zip(_drawings(effect), before, places(effect, strip), strict=True):
         if old is not None and new is not None and not np.array_equal(old, new):

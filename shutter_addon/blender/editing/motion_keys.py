@@ -248,7 +248,7 @@ def _keys_at(curve: fcurves.Timed, frame: float) -> list:
 
 
 def _tracked_value(curve: fcurves.Timed, frame: float) -> float:
-    """Return the value that tracking had found at a frame, for a keyframe of the user's there to store."""
+    """Return the value that tracking had found at a frame. A user's keyframe that is inserted there stores it."""
     for key in _keys_at(curve, frame):
         if key.type != MADE:
             return key.back

@@ -120,7 +120,7 @@ def _find_action(scene: Scene) -> None:
 
 
 def _find_scenes(scenes: list[Scene]) -> None:
-    """Restore pointers of effects and strips to their effect scene, which has the same identity. Also after pasting."""
+    """Restore pointers of effects and strips to their effect scene, by the identity that all three store."""
     known = {scene.virtual_shutter.identity: scene for scene in reversed(_oldest_first(_effect_scenes()))}
     for scene in scenes:
         for effect in scene.virtual_shutter.effects:
@@ -194,9 +194,9 @@ def _adopt(scenes: list[Scene]) -> None:
 
 
 def _place(strip: Strip) -> tuple[bool, int, int]:
-    """Return a sort key by which, of strips that show the same effect, the one comes first that keeps it.
+    """Return a sort key for effect strips that show the same effect. The first in this order keeps the effect.
 
-    That is one whose content begins where the effect's does, then the first.
+    It is the strip whose content begins where the effect's does, else the first on the timeline. The others get copies.
     """
     effect = strips.effect_of(strip.id_data, strip.scene)
     return effect is None or strips.origin(strip) != effect.start, strip.left_handle, strip.channel

@@ -22,7 +22,10 @@ _effects: RecentValues[str, dict] = RecentValues()
 
 
 def keep(effect: PropertyGroup) -> None:
-    """Keep an effect that is about to be removed under its identity: properties, F-curves and annotation."""
+    """Keep in memory an effect that is about to be removed: properties, F-curves and annotation.
+
+    It can be restored by the identity of its effect scene.
+    """
     if effect.scene is not None and effect.scene.virtual_shutter.identity:
         _keep(effect.scene.virtual_shutter.identity, effect)
 
@@ -87,7 +90,14 @@ def forget() -> None:
 
 
 def restore(scene: Scene, identity: str) -> Scene | None:
-    """Make a kept effect again in a scene, with a new effect scene, and return that; None: none has this identity."""
+    """Make a kept effect again in a scene, with a new effect scene.
+
+    Args:
+        identity: Of the effect scene that it had.
+
+    Returns:
+        The new effect scene; None: no effect was kept under this identity.
+    """
     if (data := _effects.get(identity)) is None:
         return None
     effect_scene = add_effect.new_effect_scene(scene, identity, *data["scene"])

@@ -1,4 +1,4 @@
-"""The bar editor: a gizmo in the preview that shows the active shutter's bars, to paint and key them."""
+"""The bar editor: a gizmo in the preview that shows the active shutter's bars (weights of frames), to paint and key."""
 
 from dataclasses import dataclass
 

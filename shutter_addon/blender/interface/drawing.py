@@ -31,7 +31,7 @@ BACK = (0.08, 0.08, 0.08, 0.8)  # behind texts and bars, to be readable on any f
 
 
 def ui_scale() -> float:
-    """Return how many pixels an interface unit has: 1 at Blender's default *Resolution Scale*."""
+    """Return how many pixels an interface unit has, which the screen's density and *Resolution Scale* determine."""
     return bpy.context.preferences.system.ui_scale
 
 

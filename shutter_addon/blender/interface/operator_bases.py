@@ -231,7 +231,7 @@ def show_status(words: str | None) -> None:
 
 
 def end_all() -> None:
-    """End all operators that work in steps, before another file is loaded."""
+    """End all running operators that work in steps (Beside), before another file is loaded."""
     while Beside.timers:  # Blender crashes if the status text changes while it quits
         bpy.context.window_manager.event_timer_remove(Beside.timers.pop())
         show_status(None)

@@ -44,7 +44,7 @@ def sentence(layout: UILayout, words: str, icon: str = "NONE", room: float = 1.0
 
 
 def draw_list(layout: UILayout, effect: PropertyGroup, kind: str, count: int) -> None:
-    """Draw the list of shutters or regions, with buttons to add, remove and move.
+    """Draw the list of shutters or regions with its buttons, such as Add and Remove.
 
     Args:
         kind: "shutter" or "region".

@@ -89,7 +89,10 @@ def shutter_menu(layout: UILayout, _context: Context) -> None:
 
 
 class SEQUENCER_PT_shutter(Panel):
-    """The first panel. It fits into Blender's default layout without scrolling."""
+    """The first panel of the Shutter tab: live preview, source, shutters, and buttons to draw and track.
+
+    It fits into Blender's default layout without scrolling.
+    """
 
     bl_label = "Shutter"
     bl_space_type = "SEQUENCE_EDITOR"

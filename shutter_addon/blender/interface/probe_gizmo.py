@@ -23,16 +23,18 @@ _MARK = (1.0, 1.0, 1.0, 0.9)
 
 
 def probed_at(renderer: Renderer, request: Request, point: Sequence[float]) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return how a pixel is exposed: how much of each shutter it gets, and the bars that result.
+    """Return how a pixel is exposed: how much of each shutter it gets, and how much each frame counts for it.
 
-    To be called where Blender's GPU draws; one texel is read from it. Coefficients are made again only if something
-    changed since they were drawn.
+    To be called where Blender's GPU draws; one texel is read from it. The shares of shutters are computed again only if
+    something changed since they were drawn.
 
     Args:
         point: In fractions of the picture, y up.
 
     Returns:
-        The pixel's coefficients (N,), which sum to 1, and bars (L,); None: the point is outside the picture.
+        The share of each shutter (N,), which sum to 1, and the weight of each frame (L,); None: the point is outside
+        the
+        picture.
     """
     source = renderer.source
     column, row = int(np.floor(point[0] * source.width)), int(np.floor((1 - point[1]) * source.height))
@@ -111,8 +113,8 @@ def _draw(region: Region, point: Sequence, shutters: Sequence, shares: np.ndarra
 
     Args:
         point: Probed point in pixels of the region.
-        shares: The pixel's coefficients (N,).
-        mixed: Its bars (L,).
+        shares: How much of each shutter the pixel gets (N,).
+        mixed: How much each frame counts for it (L,).
     """
     unit = drawing.ui_scale()
     frame, bars, lines = layout(point, (region.width, region.height), len(shutters), unit)

@@ -52,23 +52,23 @@ class _Film:
 
 
 def begin(scene: Scene) -> None:
-    """Prepare feeding when the render of an edit begins. Only renders without a window are fed."""
+    """When a render of an edit begins, prepare to give it finished pictures. Only in renders without a window."""
     end()
     if render_job.where() is Where.BACKGROUND and scene.sequence_editor is not None:
         render_job.job.film_data.feed = _Film(scene.session_uid)
 
 
 def end() -> None:
-    """Restore the edit, and stop feeding."""
+    """Remove the temporary strip and restore the edit."""
     film, render_job.job.film_data.feed = render_job.job.film_data.feed, None
     if film is not None:
         film.changed.close()
 
 
 def before_frame(scene: Scene) -> None:
-    """Before each frame of a render: write its levels to the file, and show the file's strip, if the frame can be fed.
+    """Before each frame of a render: write its levels to the file and show the file's strip, if that is possible.
 
-    If not, the strip is hidden, and Blender asks the engine.
+    Otherwise the strip is hidden, and Blender asks the engine.
     """
     film = render_job.job.film_data.feed
     if film is None or film.scene != scene.session_uid:

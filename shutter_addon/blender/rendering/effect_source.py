@@ -48,7 +48,7 @@ class Detail:
     Attributes:
         divisor: How many times smaller than the source the picture is in width and height (media.open_source).
         proxy: The proxy that frames are read from, if it fits the footage; None: the footage.
-        smooth: Whether moments between frames are exposed, too, if the effect wants that.
+        smooth: Whether moments between the footage's frames are exposed, too, if the effect wants that.
     """
 
     divisor: int = 1
@@ -84,7 +84,7 @@ class SourceKey:
 
     @staticmethod
     def of(snapshot: Snapshot, detail: Detail = FULL) -> SourceKey:
-        """Return the key for an effect in a detail.
+        """Return the key for an effect in pictures of some detail.
 
         Raises:
             EffectError, MediaError: The footage cannot be read to find the steps.
@@ -97,7 +97,7 @@ class SourceKey:
 
     @property
     def place(self) -> tuple[int, bool]:
-        """Where a session keeps its renderer: an effect has one for plain and one for smooth pictures."""
+        """Where a session keeps its renderer: an effect has one with moments between frames, and one without."""
         return self.scene, self.steps > 1
 
     def open(self, *, planes: bool = False, keeps: bool = False) -> ShotSource:

@@ -1,4 +1,4 @@
-"""Get the snapshot of the effect whose picture is to be made, read at a time when Blender's data may be read.
+"""Get the snapshot (plain data) of the effect whose picture is to be made, read when Blender's data may be read.
 
 On Blender's main thread, an effect is read when its picture is asked for. In the background, the second frame of a film
 reads it for all later ones, unless a script that runs at frames may change it. A job of the window renders on a thread
@@ -25,7 +25,7 @@ from .render_job import Where, job
 
 
 def begin(film: int) -> None:
-    """Read all effects that a film shows, when a job of the window begins. To be called on the main thread.
+    """Read all effects that a film shows, before another thread renders it. Called on the main thread.
 
     Args:
         film: session_uid of the rendered scene.
@@ -56,13 +56,13 @@ def _part_at(parts: list[tuple[range, Snapshot]], scene_frame: float) -> Snapsho
 
 
 def end() -> None:
-    """Forget all snapshots, after a job or a film."""
+    """Forget all snapshots, after a render."""
     job.film_data = render_job.FilmData(feed=job.film_data.feed)
     sessions.end_job()
 
 
 def look(film: int) -> None:
-    """Find out again at which frames the sequencer leaves effects out, and why; a job cannot look that up itself.
+    """Find out again at which frames the sequencer leaves effects out, and why, for a render on another thread.
 
     The user may delete a camera during the render, for example.
 
@@ -80,7 +80,7 @@ def left_out(scene: Scene) -> str | None:
 
 
 def of(effect_scene: Scene, scene_frame: float, ended: Callable[[], bool] | None = None) -> tuple[Snapshot, float]:
-    """Return the snapshot for a frame of an effect scene, and the timeline frame at which that is shown.
+    """Return the snapshot (plain data) for a frame of an effect scene, and the timeline frame at which that is shown.
 
     Args:
         ended: Tells whether the result is no longer wanted; None: wait for a few seconds at most.
@@ -126,7 +126,7 @@ def _of_film(scene: Scene, effect: PropertyGroup, strip: Strip, frame: float) ->
 
 
 def _late(uid: int, scene_frame: float) -> Snapshot:
-    """Return a snapshot that a job did not take when it began. To be called on the main thread.
+    """Return a snapshot that was not taken when a render began. Called on the main thread.
 
     Args:
         uid: session_uid of the effect scene.

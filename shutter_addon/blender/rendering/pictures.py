@@ -54,9 +54,9 @@ def picture(context: RenderContext, snapshot: Snapshot, frame: float, detail: De
 
 
 def _weights(renderer: Renderer, request: Request) -> list[np.ndarray]:
-    """Return the pictures for --weights: the coefficients (h, w) of all shutters, then the mattes of all layers.
+    """Return the pictures (h, w) for --weights: how much of each shutter pixels get, then the mattes of layers.
 
-    Both have a pixel for each block of pixels that shares coefficients.
+    Each has a pixel for each block of the picture's pixels that share this.
     """
     block = request.state.options.aggregate
     mattes = [block_means(matte, block) for matte in renderer.layer_mattes(request)]

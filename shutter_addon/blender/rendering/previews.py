@@ -190,7 +190,7 @@ def for_drawing(context: Context, shown: Shown, decision: Decision | None) -> Dr
 
 
 def request_of(context: Context, shown: Shown) -> Request:
-    """Return the request for the picture that our draw handler draws of an effect strip at the current frame.
+    """Return what to compose for the picture that our draw handler draws of an effect strip at the current frame.
 
     Raises:
         effect_source.FAULTS: The effect cannot be shown.
@@ -215,7 +215,7 @@ def _snapshot(shown: Shown) -> Snapshot:
 
 
 def _requested(context: Context, shown: Shown, snapshot: Snapshot, look: Look) -> Request:
-    """Return the request in the detail of previews or, with *Full Quality*, in full detail.
+    """Return what to compose (a Request) in the detail of previews or, with *Full Quality*, in full detail.
 
     *Full Quality* ends here when another frame is shown or the effect has changed.
     """
@@ -231,7 +231,7 @@ def _requested(context: Context, shown: Shown, snapshot: Snapshot, look: Look) -
 
 
 def _best(context: Context, snapshot: Snapshot, frame: float, detail: effect_source.Detail) -> Request:
-    """Return the request with moments between frames (smooth) if these are ready, else the one without."""
+    """Return the request for a picture that also exposes moments between frames if that is ready, else without them."""
     render = sessions.of_drawing()
     if not is_read(context) and detail.smooth:
         for smooth_request in features.each("smooth_request"):
@@ -309,7 +309,7 @@ def _time_up(context: Context, key: tuple) -> Slice:
 
 
 def refine() -> None:
-    """Go on for a moment with the pictures with moments between frames that will replace those that are drawn.
+    """Go on with pictures that also expose moments between frames, which will replace those that are drawn.
 
     Raises:
         effect_source.FAULTS: One cannot be made.

@@ -39,7 +39,7 @@ _LONG = 10.0  # seconds that a thread waits for the window
 
 
 def say(text: str) -> None:
-    """Print a line on stderr."""
+    """Print a message on stderr, after the extension's name."""
     with suppress(OSError, AttributeError):  # stderr is closed, or missing
         print(signed(text), file=sys.stderr, flush=True)
 
@@ -144,7 +144,7 @@ def begin(scene: Scene) -> bool:
 
 
 def runs() -> bool:
-    """Tell whether a film, or a single picture of it, is being rendered."""
+    """Tell whether a render of the user's is running, of a film or a single picture."""
     return job.film is not None
 
 
@@ -157,10 +157,13 @@ def is_film(scene: Scene) -> bool:
 
 
 def end(scene: Scene, alone: bool) -> None:
-    """Note that the render of a scene has ended. In the background, a failed one may end the process.
+    """Note that the render of a scene has ended.
+
+    If it failed in the background and no script waits, end the process with BAD_INPUT: Blender would go on, or exit
+    with 1.
 
     Args:
-        alone: Whether no Python code waits for it, so that Blender would go on, or exit as if nothing had failed.
+        alone: Whether no Python code waits for it.
     """
     if scene.session_uid == job.film:
         job.film = None
@@ -173,7 +176,7 @@ def end(scene: Scene, alone: bool) -> None:
 
 
 def ends_films() -> bool:
-    """Tell whether an error here has to end a film: in the background, in a job of the window, or in a script.
+    """Tell whether an error here has to end a whole render: in the background, on a job's thread, or in a script.
 
     Otherwise the error is in a preview.
     """
@@ -260,7 +263,7 @@ def stopping() -> bool:
 
 
 def fail(text: str) -> None:
-    """Note why the running render has to end, and tell the user. Only the first reason counts."""
+    """Note a sentence about why the running render has to end, and tell the user. Only the first one counts."""
     if job.failure is None:
         job.failure = text
         job.tell(text)
@@ -304,7 +307,7 @@ def popup(words: str, **looks: str) -> None:
 
 
 def _cancel() -> None:
-    """End the running render by an error of our engine in a small render.
+    """End the running render by starting a small one with our engine, which fails.
 
     An engine's error ends renders if it reaches an operator. Errors from within the sequencer reach none, so a small
     render beside it fails.
@@ -327,9 +330,9 @@ def _cancel() -> None:
 
 
 def _remove_spent() -> float | None:
-    """Remove the scenes and cameras of small renders (_cancel), once the job has ended. Also a timer of Blender.
+    """Remove the scenes and objects that _cancel has made, once the render has ended. Also a timer of Blender.
 
-    During the film, Blender would free data of other effects in the same frame along with it, and crash.
+    During the render, Blender would free data of other effects in the same frame along with it, and crash.
     """
     if bpy.app.is_job_running("RENDER"):
         return _PATIENCE

@@ -102,14 +102,14 @@ class RenderContext:
     display: Display | None = None
 
     def request(self, snapshot: Snapshot, frame: float, detail: Detail | None = None) -> Request:
-        """Return the request for what an effect strip shows at a timeline frame.
+        """Return the request for an effect strip's picture at a timeline frame: what it depends on, as plain data.
 
         Args:
             detail: How detailed; None: as the last picture was, where no picture will be made.
 
         Raises:
             effect_source.FAULTS: The effect cannot be shown.
-            StoppedError: It is no longer wanted.
+            StoppedError: The picture is no longer wanted.
         """
         session = self.session
         key = SourceKey.of(snapshot, detail or session.last_detail(snapshot.scene))
@@ -171,7 +171,10 @@ class RenderSession:
         return self.device != "blender"
 
     def run(self, function: Callable[..., T], *arguments: object) -> T:
-        """Return the result of a function that uses the device, even if the picture being made is no longer wanted."""
+        """Call a function that uses the device, wait for its turn, and return its result.
+
+        It is not given up where the picture being made is no longer wanted.
+        """
         with stopping.once(stopping.never):
             return self._submit(function, *arguments).result()
 
@@ -228,7 +231,9 @@ class RenderSession:
         return known[0].detail if known else FULL
 
     def renderer(self, key: SourceKey, say: Say = print) -> Renderer:
-        """Return the renderer for a key, opened if necessary. An effect has one for plain and one for smooth pictures.
+        """Return the renderer for a key, opened if necessary.
+
+        An effect may have two: one with moments between frames, and one without.
 
         Raises:
             effect_source.FAULTS: The device or the footage cannot be opened.

@@ -35,7 +35,7 @@ class _Sessions(NamedTuple):
 
 
 def _ask_window() -> None:
-    """In a job, free the GPU memory of the window's previews, which load their frames again when they are drawn."""
+    """On a job's thread, free the GPU memory of the window's previews, which load frames again when drawn."""
     if render_job.where() is Where.JOB:
         main_thread.ask(SESSIONS.window.free, _ANSWER)
 
@@ -91,7 +91,7 @@ def close_if_device_changed() -> None:
 
 
 def end_job() -> None:
-    """Stop making pictures ahead after a job, and forget snapshots. Renderers stay open for the next render."""
+    """After a render, stop making pictures ahead and forget snapshots. Renderers stay open for the next render."""
     if render_job.where() is Where.JOB:
         SESSIONS.offscreen.rest()
     SESSIONS.offscreen.requests.clear()
