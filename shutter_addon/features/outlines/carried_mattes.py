@@ -96,7 +96,7 @@ class CarriedMattes(SourceWrapper):
         return None if near == (None, None) else self._described(self._path(index, *near))
 
     def _described(self, path: Path) -> float | None:
-        """Return the confidence that a matte's file states; None: there is no such file of ours."""
+        """Return the confidence, 0 to 1, that a matte's file states; None: it is missing, or of another program."""
         if (image := derived.opened(path, self._spec)) is None:
             return None
         with closing(image):
@@ -279,7 +279,7 @@ class CarriedMattes(SourceWrapper):
         return f"{self.path.stem[:40]}-{derived.key(derived.identity(self._source))}"
 
     def _kept(self, path: Path) -> np.ndarray | None:
-        """Return the matte (H, W) uint8 in a file, or None if the file is missing, damaged or not ours."""
+        """Return the matte (H, W) uint8 in a file; None: it is missing, damaged or not written by this program."""
         samples = derived.read(path, self._spec, CONFIDENCE)
         return None if samples is None else samples[..., 0]
 

@@ -185,10 +185,9 @@ def found(network: Network, picture: np.ndarray, on: np.ndarray, off: np.ndarray
 
 
 def _sure(share: np.ndarray, on: np.ndarray, box: Box) -> float:
-    """Return how sure the network is of a part that it found under strokes, 0 to 1.
+    """Return how sure the network is of what it found under strokes, 0 to 1.
 
-    It is 0 if the part covers too little of the strokes or nearly the whole picture, and less where the box cuts it
-    off.
+    It is 0 if that covers too little of the strokes or nearly the whole picture, and less where the box cuts it off.
 
     Args:
         share: The network's answer, (h, w).
@@ -225,14 +224,14 @@ def _from(value: float, ends: tuple[float, float]) -> float:
 def without(subject: Found, picture: np.ndarray, on: np.ndarray, off: np.ndarray) -> Found:
     """Remove from a subject what strokes mark as not belonging to it, and return the rest.
 
-    If they touch a separate part that is smaller than the rest, all of it goes. Otherwise goes what lies on their side
-    of the picture's edges between them and the strokes on the subject.
+    If they touch a separate part that is smaller than the rest, all of that part is removed. Otherwise what is removed
+    is what lies on their side of the picture's edges between them and the strokes on the subject.
 
     Args:
         picture: (h, w, 3) uint8.
-        on: (h, w) bool, what strokes on the subject cover. If none is in the touched part, what is far from `off`
+        on: (h, w) bool, the pixels of strokes on the subject. If the touched part has none, what is far from `off`
             counts.
-        off: (h, w) bool, what strokes on what the subject is not cover.
+        off: (h, w) bool, the pixels of strokes on what the subject is not.
     """
     inside = subject.share > INSIDE
     _, parts = cv2.connectedComponents(inside.astype(np.uint8))
@@ -422,6 +421,7 @@ class SubjectMattes(CarriedMattes):
 
     def read(self, index: int) -> np.ndarray:
         """Return a frame's matte (height, width) float32, 0 to 1. If it is not kept yet, make it and its chain.
+
         Raises:
             MediaError: A frame or the network cannot be read, or the folder cannot be written to.
         """

@@ -60,10 +60,10 @@ class Repeats:
         self._changes: RecentValues[int, float] = RecentValues()
 
     def gap(self, index: int) -> tuple[int, int]:
-        """Return the two frames between which the moments after a frame lie.
+        """Return the two frames from which the pictures between a frame and the next are computed.
 
-        Those are the frame and the next one. Where frames repeat, they are the first of the equal frames and the next
-        different frame of the same shot.
+        Usually these are the frame and the next one. Where frames repeat, they are the first of the equal frames and
+        the next different frame of the same shot.
         """
         first, stop = index, index + 1
         while stop - first <= MOST and self._change(first) <= REPEATED:
@@ -104,7 +104,7 @@ class Repeats:
 
 
 class SmoothSource(SourceWrapper):
-    """A source with the frames of another source and moments between them, computed by optical flow.
+    """A source with the frames of another source and moments between them, which are pictures computed by optical flow.
 
     Frame i of the other source is at index i · step. Where two frames have nothing in common, as at a cut, a moment
     between them is the nearer frame.
@@ -138,7 +138,7 @@ class SmoothSource(SourceWrapper):
         self.repeats = False
 
     def read(self, index: int) -> np.ndarray:
-        """Return a frame or a moment (height, width, 4). It raises what the source's `read` raises."""
+        """Return a frame or a moment, as RGBA (height, width, 4). It raises what the source's `read` raises."""
         return as_rgba(self.decoded(index))
 
     def decoded(self, index: int) -> Decoded:
@@ -154,7 +154,7 @@ class SmoothSource(SourceWrapper):
         return self._moment((filmed, filmed + 1), number) if number else self._source.read(filmed)
 
     def _moment(self, pair: tuple[int, int], number: int) -> Decoded:
-        """Return a moment between two frames; the nearer frame if they have nothing in common.
+        """Return the picture at a moment between two frames; the nearer frame if they have nothing in common.
 
         Args:
             pair: The two frames.

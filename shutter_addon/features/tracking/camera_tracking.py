@@ -41,7 +41,7 @@ class CameraTrack(tracking.Track):
         """Prepare to track the camera.
 
         Args:
-            camera: Gives its placement where tracking starts.
+            camera: Gives its location, rotation and scale where tracking starts.
             regions: What to leave out at each frame, since it may move by itself.
         """
         super().__init__(camera)

@@ -51,7 +51,7 @@ def follow_carried(
     """Track what a tracked outline or a subject covers, by its mattes. Yield what MatteTrack.follow yields.
 
     Args:
-        region: Gives its placement and its center.
+        region: Gives its center, and its location, rotation and scale where tracking starts.
         file: Makes and reads its mattes.
         shown: The frame of the footage for each timeline frame.
         what: Arguments of MatteTrack.follow.
@@ -69,13 +69,13 @@ def follow_carried(
 
 
 class MatteTrack(tracking.Track):
-    """Tracks what a matte covers."""
+    """Tracks what a region's matte covers, from frame to frame (Track.follow)."""
 
     def __init__(self, region: Subject, cover: Cover) -> None:
         """Prepare to track a region.
 
         Args:
-            region: Gives its placement and its center.
+            region: Gives its center, and its location, rotation and scale where tracking starts.
             cover: Gives its matte at a timeline frame.
         """
         super().__init__(region)

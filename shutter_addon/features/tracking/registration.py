@@ -76,7 +76,7 @@ class Part:
     """
 
     def __init__(self, picture: np.ndarray, weight: np.ndarray) -> None:
-        """Take a part of a picture.
+        """Take a part of a picture, and find its corners.
 
         Args:
             picture: (H, W) uint8.
@@ -99,10 +99,10 @@ class Part:
         self._ends = np.array([complex(a, b) for a in (x, x + width) for b in (y, y + height)])
 
     def find(self, picture: np.ndarray, guess: Similarity, motion: Motion) -> Match | None:
-        """Find the part in a picture.
+        """Find the part in a picture by its corners.
 
         Args:
-            guess: The motion to expect.
+            guess: The motion to expect, from the part's picture to this one.
             motion: What may change, one of MOTIONS.
 
         Returns:
@@ -117,7 +117,9 @@ class Part:
         return match and replace(match, likeness=self._likeness(picture, match.motion))
 
     def seek(self, picture: np.ndarray, known: Similarity, radius: float) -> Similarity | None:
-        """Return the motion to the place in a picture that looks most like the part, as a guess for `find`.Args:
+        """Return the motion to the place in a picture that looks most like the part, as a guess for `find`.
+
+        Args:
             picture: (H, W) uint8.
             known: Motion to where it was; rotation and scale stay so.
             radius: How far from there to search, in pixels.
@@ -174,7 +176,7 @@ class Part:
         return np.where(fits, scores, np.float32(_NOWHERE)), alone, around
 
     def rival(self, radius: float) -> float:
-        """Return how much the part's surroundings look like it, 0 to 1; then tracking may slip.
+        """Return how much the part's surroundings look like it, 0 to 1. The more, the easier tracking slips onto them.
 
         It is the highest correlation with its own picture, displaced by up to `radius` pixels, outside the peak at no
         displacement; 0 if none is above ALIKE. Shading that is coarser than the windows does not count, since it does
@@ -366,7 +368,7 @@ def fit(
 
 
 def _hypotheses(p: np.ndarray, q: np.ndarray, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
-    """Return candidates for a similarity from points p to points q (n,), each made from one or two pairs at random.
+    """Return candidates for a similarity from points p to points q (n,), each made from one or two pairs.
 
     Args:
         motion: What may change, one of MOTIONS.

@@ -97,6 +97,9 @@ class FoundMotion(NamedTuple):
 class PartTracker:
     """Follows a part of a picture from frame to frame.
 
+    It is found by how it looked in the picture where tracking began (its first look) or, where that fails, in the last
+    picture in which it was found (a later look).
+
     Attributes:
         reason: Why it was not found in the last picture, one of this module's sentences.
     """
@@ -140,8 +143,9 @@ class PartTracker:
     def _trusted(self, picture: np.ndarray, sighting: FoundMotion, goes_on: bool) -> float:
         """Return how sure it is that what was found is still the part, 0 to 1.
 
-        It stays as sure as before as far as the corners come from the part's last place. If they all do, it is at least
-        the likeness to the first look, unless the part was lost and something else looks like it, too.
+        If only a share of the corners comes from the part's last place, it is that share as sure as before. If all do,
+        it is at least as sure as the likeness to the first look says, unless the part was lost and something else looks
+        like it, too.
 
         Args:
             picture: The picture.
@@ -309,13 +313,13 @@ class Track(ABC):
     """Tracks a subject, a region or the camera, through timeline frames. Call `follow` once."""
 
     def __init__(self, subject: Subject) -> None:
-        """Prepare to track a subject, whose placement is known where tracking starts and at anchors."""
+        """Prepare to track a subject, which says where it is at the frame where tracking starts and at anchors."""
         self._subject = subject
 
     def follow(
         self, footage: Footage, start: int, frames: range, *, motion: Motion = "scale", anchors: Collection[int] = ()
     ) -> Iterator[Tracked]:
-        """Yield placements at timeline frames: at `start`, then after it, then before it.
+        """Yield where the subject is (Tracked) at timeline frames: at `start`, then after it, then before it.
 
         A direction that ends early ends with a Tracked that has a fault. If a gap is left on the way to an anchor,
         there is a fault on each side of it.
@@ -325,8 +329,8 @@ class Track(ABC):
             start: The first frame.
             frames: All frames that may be tracked, with `start`.
             motion: What changes: "location", also "rotation", or also "scale".
-            anchors: Frames with correct placements. Tracking ends at the nearest one on each side. Frames in between
-                are then yielded again, blended with tracking back from the anchor.
+            anchors: Frames where the subject's own placement is right. Tracking ends at the nearest one on each side.
+                Frames in between are then yielded again, blended with tracking back from the anchor.
 
         Raises:
             TrackingError: Nothing can be tracked.
@@ -347,6 +351,7 @@ class Track(ABC):
     @abstractmethod
     def _tracker(self, start: int) -> tuple[Pursuit, float]:
         """Return what follows the subject shown at the frame `start`, and how sure it is that this is it, 0 to 1.
+
         Raises:
             TrackingError: There is nothing to follow.
         """
@@ -361,11 +366,11 @@ class Track(ABC):
                 yield from self._between(start, anchor)
 
     def _onward(self, start: int, frames: range) -> Iterator[Tracked]:
-        """Track frames away from `start` in a direction without an anchor."""
+        """Yield where the subject is at frames that lead away from `start`, in a direction without an anchor."""
         return self._from(start, frames)
 
     def _placement(self, frame: int) -> Placement:
-        """Return the subject's placement at a frame where tracking starts."""
+        """Return the subject's placement (location, rotation, scale) at a frame where tracking starts."""
         return self._subject.placement(frame)
 
     def _between(self, start: int, anchor: int) -> Iterator[Tracked]:

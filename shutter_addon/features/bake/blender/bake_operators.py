@@ -39,8 +39,8 @@ class _Bake:
     """The state of baking in this Blender.
 
     Attributes:
-        running: The job whose film is wanted; None: none.
-        stopped: The last job that was ended; it may still be finishing a frame.
+        running: The bake that is running; None: none.
+        stopped: The last bake that was stopped; it may still be finishing a frame.
         failure: Identity of the effect whose bake failed last, and why.
     """
 
@@ -132,7 +132,7 @@ def _look() -> float | None:
 
 
 def _lay(job: baked_film.BakeJob) -> str | None:
-    """Add the baked strip of a finished job. Return why that is impossible; None: it was added."""
+    """Add the baked strip of a bake that has finished. Return why that is impossible; None: it was added."""
     scene = strips.scene_of_uid(job.scene)
     parts = [s for s in strips.effect_strips(scene) if s.scene.virtual_shutter.identity == job.effect] if scene else []
     if not parts:

@@ -284,7 +284,7 @@ def subject_outline(self: Operator, _context: Context, effect: PropertyGroup) ->
 
 
 def after_stroke(context: Context, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
-    """After the first stroke of a new effect, look for a subject under it, and make the region one if there is one.
+    """After the first stroke of a new effect, look for a subject under it. If there is one, the region becomes it.
 
     Called when the pen goes up. Further strokes then mark the subject.
     """

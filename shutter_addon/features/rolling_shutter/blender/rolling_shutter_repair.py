@@ -67,13 +67,13 @@ def of(effect: PropertyGroup) -> Repair | None:
 
 
 def _moment(shutter: PropertyGroup) -> float:
-    """Return the middle of a shutter's open time, in bars from the middle of the first one; NaN: it is never open."""
+    """Return the middle of the time that a shutter is open, in frames from its first one; NaN: it is never open."""
     weights = bars(shutter)
     return float((weights * np.arange(len(weights))).sum() / weights.sum()) if weights.any() else math.nan
 
 
 def _shown(effect: PropertyGroup) -> int:
-    """Return the index of the bar that exposes the shown frame when *Position* is *Center*."""
+    """Return the index of the frame of the shutters' window that is the shown frame, with *Position* at *Center*."""
     return Options(validation.number(effect, "window"), position="center").before
 
 

@@ -26,14 +26,14 @@ _UNSEEN = 5.0  # seconds without a request after which a picture is dropped
 
 @dataclass
 class _Coming:
-    """A smooth picture that is being made.
+    """A picture with moments between frames (smooth) that is being made for a preview.
 
     Attributes:
-        key: Key of the plain picture, and effect_source.steps_key.
+        key: Key of the picture without moments (plain), and effect_source.steps_key.
         asked: What was last asked for: context, snapshot, timeline frame and detail.
-        steps: Finds the number of moments on a thread; None: not begun.
+        steps: Finds on a thread how many moments there are from frame to frame; None: not begun.
         since: When it was last asked for (time.monotonic).
-        is_asked: Whether it was asked for since the last look.
+        is_asked: Whether it was asked for since advance_smooth was last called.
         is_seen: Whether the plain picture was drawn.
         is_over: Whether nothing is left to do.
         is_alone: Whether the device has no room for both pictures.
@@ -70,12 +70,12 @@ class _Coming:
         return bool(self.asked[0].renderer(request).missing(request))
 
     def rest(self) -> None:
-        """Have the thread stop making moments."""
+        """Have the thread stop computing the moments between frames."""
         if (request := self.request()) is not None:
             self.asked[0].renderer(request).source.want(())
 
     def advance(self, seconds: float) -> float:
-        """Do a part of the work: find the number of moments, or compose the picture for some seconds.
+        """Do a part of the work: find how many moments there are, or compose the picture for some seconds.
 
         Returns:
             In how many seconds to redraw and go on.
@@ -108,7 +108,9 @@ _coming: dict[int, _Coming] = {}  # by effect scene
 
 
 def smooth_request(render: RenderContext, snapshot: Snapshot, frame: float, detail: Detail) -> Request:
-    """Return the request for the smooth picture if that is ready, else for the plain one. Begin to make the smooth one.
+    """Return the request for the picture with moments between frames if that is ready, else for the one without.
+
+    Begin to make the one with moments, if the effect wants it.
 
     Raises:
         effect_source.FAULTS: The effect cannot be shown.
@@ -135,7 +137,7 @@ def smooth_request(render: RenderContext, snapshot: Snapshot, frame: float, deta
 
 
 def smooth_comes(scene: int) -> bool:
-    """Tell whether a smooth picture is being made.
+    """Tell whether a picture with moments between frames is being made.
 
     Args:
         scene: session_uid of the effect scene.
@@ -144,7 +146,7 @@ def smooth_comes(scene: int) -> bool:
 
 
 def advance_smooth(seconds: float) -> None:
-    """Go on with the smooth pictures whose plain ones were drawn, for some seconds each.
+    """Go on making pictures with moments between frames, for some seconds each, once the ones without were drawn.
 
     Raises:
         effect_source.FAULTS: One cannot be made.
@@ -168,12 +170,12 @@ def advance_smooth(seconds: float) -> None:
 
 
 def rest_smooth() -> None:
-    """Stop making smooth pictures, because the playhead moves or the user draws."""
+    """Stop making pictures with moments between frames, because the playhead moves or the user draws."""
     while _coming:
         _coming.popitem()[1].rest()
 
 
 def forget_pictures() -> None:
-    """Wait for threads and forget all smooth pictures, when a file is loaded or the extension is disabled."""
+    """Wait for threads and forget all pictures in work, when a file is loaded or the extension is disabled."""
     wait([coming.steps for coming in _coming.values() if coming.steps is not None])
     _coming.clear()

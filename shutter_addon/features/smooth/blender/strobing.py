@@ -47,8 +47,8 @@ class _Measuring:
 
     Attributes:
         moved: Motion by the source's key and the first frame of a pair of neighbors; None: it cannot be found.
-        looks: By session_uid of the effect scene, what `look` found last: the timeline frame, the step in pixels, and
-            whether the source repeats frames.
+        looks: By session_uid of the effect scene, what the last call of `look` found: the timeline frame, the step in
+            pixels, and whether the source repeats frames.
         wanted: What to measure next: a source, and the first frame of a pair; None: nothing.
         job: The measurement that is running; None: none.
     """
@@ -67,7 +67,7 @@ def look(effect: PropertyGroup, snapshot: Snapshot, renderer: Renderer, request:
 
     Returns:
         The step from frame to frame in pixels of the footage; None: it is small enough for a streak, or not known yet.
-        And whether the result differs from the last look's.
+        And whether anything differs from the result of the last call.
     """
     _measuring.wanted, before = None, (last(effect), repeats(effect))
     frame, known = effect.id_data.frame_current, _step(effect, snapshot, renderer, request)
@@ -76,13 +76,13 @@ def look(effect: PropertyGroup, snapshot: Snapshot, renderer: Renderer, request:
 
 
 def last(effect: PropertyGroup) -> float | None:
-    """Return the step in pixels that the last look found, if it was at the current frame, else None."""
+    """Return the step in pixels that `look` found last, if that was at the current frame, else None."""
     frame, known, _repeats = _measuring.looks.get(effect.scene.session_uid, _NEVER)
     return known if frame == effect.id_data.frame_current else None
 
 
 def repeats(effect: PropertyGroup) -> bool:
-    """Tell whether the last look found that the source repeats frames."""
+    """Tell whether `look` found last that the source repeats frames."""
     return _measuring.looks.get(effect.scene.session_uid, _NEVER)[-1]
 
 

@@ -194,7 +194,11 @@ def _followed(
     result = {start: subject.placement(start)}
 
     def carried(origin: int, frame: int, near: Placement) -> Placement | None:
-        """Return the placement at a frame, with its rotation near another one's; None: there are too few points."""
+        """Return where the region is at a frame, moved along from the frame `origin`; None: there are too few points.
+
+        Args:
+            near: Its place at a neighboring frame, from which rotation goes on without a jump by whole turns.
+        """
         if (motion := moves[origin].get(frame)) is None:
             return None
         moved = motions.carried(subject.placement(origin), motion, centres[origin], centres[frame], size)

@@ -120,7 +120,8 @@ def track(
 
 def stops(effect: PropertyGroup, index: int | None) -> list[tuple[int, str, bool]]:
     """Return where tracking stopped, ascending: timeline frame, reason for the user, and whether it is a fault.
-    The end of a shot is no fault.
+
+    A cut in the footage is no fault.
     """
     return sorted((frame, rpt_(stop.fault), stop.fault != tracking.SHOT_ENDS) for frame, stop in _stops(effect, index))
 
@@ -217,7 +218,12 @@ def _subject(
 
 
 def _standing(moving: Any, here: Tracked) -> Any:
-    """Return a region or the camera as plain data with the place that the user has set at one frame, keyed or not."""
+    """Return a region or the camera as plain data, with the place that the user has set at one frame, keyed or not.
+
+    Args:
+        moving: The region or camera.
+        here: The frame and the place.
+    """
     sampled = {
         name: replace(channel, values=channel.values | {here.frame: getattr(here.placement, name)})
         for name, channel in vars(moving.moves).items()
@@ -303,9 +309,12 @@ def panning_shot(effect: PropertyGroup, index: int, key: bool = False) -> None:
 
 
 def is_tracked(scene: Scene, effect: PropertyGroup, strip: Strip, index: int | None) -> bool:
-    """Tell whether a region or the camera has a motion that is known at the current frame.
+    """Tell whether a region or the camera has keyframes of motion that reach the current frame.
 
     Otherwise *Panning Shot* and *Stabilize Exposure* track it first.
+
+    Args:
+        index: Of the region; None: the camera.
     """
     frame = scene.frame_current
     has_motion = MotionKeys(effect, index, "SCALE").reach(frame)
