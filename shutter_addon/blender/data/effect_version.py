@@ -66,9 +66,9 @@ def key(scene: Scene, effect: PropertyGroup, strip: Strip, frames: range) -> str
 
 
 def preview_key(scene: Scene, effect: PropertyGroup, strip: Strip) -> int:
-    """Return a number that changes with whatever an effect's pictures depend on, as far as Blender does not report it.
+    """Return a number that changes with what an effect's pictures depend on, where Blender does not report a change.
 
-    Properties with an update callback do not count. It is asked for often, so files count by path, size and time.
+    So properties with an update callback do not count. It is asked for often, so files count by path, size and time.
     """
     source = strips.nearest_source(scene, effect, strip)
     lies = None if source is None else (source.left_handle, _source(effect, source, _stamps, 0))

@@ -148,9 +148,9 @@ def _state(curve: FCurve | None, value: float, scene: Scene) -> str:
 
 
 def bars_now(effect: PropertyGroup, index: int) -> np.ndarray:
-    """Return a shutter's bars (L,) as the picture at the current frame uses them, interpolated between keyframes.
+    """Return how much each frame counts for a shutter (its bars, (L,)) in the picture at the current frame.
 
-    Bars that were changed and not keyed yet are returned as stored.
+    Between keyframes, bars are interpolated. Bars that were changed and not keyed yet are returned as stored.
 
     Args:
         index: Of the shutter.

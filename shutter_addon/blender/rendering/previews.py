@@ -77,12 +77,12 @@ class Decision:
 
 @dataclass(frozen=True)
 class Drawing:
-    """What our draw handler draws.
+    """What the extension's draw handler draws over a preview.
 
     Attributes:
         decision: What the preview shows.
         request: The picture to draw, as a draft where it need not be exact.
-        renderer: Makes it.
+        renderer: Makes the picture.
         left: Fraction of the picture's width from the left where the source is shown instead of the result.
         draws_result: Whether the handler draws the result; otherwise Blender shows it.
     """
@@ -164,7 +164,7 @@ def take_decision() -> Decision | None:
 
 
 def for_drawing(context: Context, shown: Shown, decision: Decision | None) -> Drawing:
-    """Return what our draw handler draws over a preview.
+    """Return what the extension's draw handler draws over a preview.
 
     Args:
         shown: The effect strip that the preview shows.

@@ -131,7 +131,7 @@ class RenderContext:
 
 
 class RenderSession:
-    """A compositor on one device, and the renderers of the effects that were shown last.
+    """A device that composes pictures, and the renderers of the effects that were shown last, which keep their frames.
 
     The device is opened when it is first used. If it can be used from any thread, it works on a thread of its own.
     """
