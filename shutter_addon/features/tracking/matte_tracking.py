@@ -142,7 +142,7 @@ class _Pursuit:
 def moved(
     first: np.ndarray, second: np.ndarray, before: np.ndarray, after: np.ndarray, motion: Motion
 ) -> FoundMotion | None:
-    """Return how what a matte covers moves from one picture to another; None: that cannot be told.
+    """Return the motion of what a matte covers from one picture to another; None: it is unknown.
 
     Args:
         first: Grey picture, (H, W) uint8.

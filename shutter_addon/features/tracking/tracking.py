@@ -350,7 +350,7 @@ class Track(ABC):
 
     @abstractmethod
     def _tracker(self, start: int) -> tuple[Pursuit, float]:
-        """Return what follows the subject shown at the frame `start`, and how sure it is that this is it, 0 to 1.
+        """Return what follows the subject shown at the frame `start`, and how sure it is to be the subject, 0 to 1.
 
         Raises:
             TrackingError: There is nothing to follow.
@@ -374,7 +374,7 @@ class Track(ABC):
         return self._subject.placement(frame)
 
     def _between(self, start: int, anchor: int) -> Iterator[Tracked]:
-        """Track from `start` to an anchor, then yield the frames again, blended with tracking back from the anchor."""
+        """Track from `start` to an anchor, then yield the frames between again, blended with tracking back from it."""
         step = 1 if anchor > start else -1
         there, back, faults = {}, {}, []
         for tracked in self._from(start, range(start + step, anchor, step)):
@@ -395,7 +395,7 @@ class Track(ABC):
         yield from (fault for fault in faults if fault.frame not in there | back)
 
     def _from(self, start: int, frames: range) -> Iterator[Tracked]:
-        """Track frames in order, away from `start`."""
+        """Yield where the subject is at frames that lead away from `start`, in order, until lost or at a cut."""
         self._footage.want(frames)
         tracker, worth = self._tracker(start)
         last, shown = Tracked(frame=start, placement=self._placement(start), confidence=1.0), start

@@ -285,7 +285,10 @@ def effect_parts(scene: Scene, strip: Strip) -> list:
 
 
 def is_stale(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
-    """Tell whether an effect has changed since it was baked, or cannot be shown. Kept until something changes."""
+    """Tell whether an effect has changed since it was baked, or cannot be shown.
+
+    The answer is kept until something changes.
+    """
     place = _place(scene, effect, strip)
     return revision.until_change("bake", place, lambda: effect_version.is_changed(scene, effect, strip))
 

@@ -65,7 +65,7 @@ def _opened(file: CarriedFile) -> CarriedMattes:
 
 
 def shown_curves(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> outlines.Curves:
-    """Return `curves_now` for drawing code. It is kept until something changes."""
+    """Return what `curves_now` returns, for drawing code. It is kept until something changes."""
     key = effect.scene.session_uid, strip.name, index, scene.frame_current
     return revision.until_change("outline", key, lambda: curves_now(scene, effect, strip, index))
 

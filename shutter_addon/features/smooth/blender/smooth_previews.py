@@ -55,7 +55,11 @@ class _Coming:
     slices: Slices = field(default_factory=Slices)
 
     def request(self) -> Request | None:
-        """Return the request for the smooth picture; None: it is not known how many moments, or no renderer is open."""
+        """Return the request for the picture with moments between frames, if that can be made without waiting.
+
+        Returns:
+            None if it is not known yet how many moments there are, or if its renderer is not open.
+        """
         render, snapshot, frame, detail = self.asked
         if known_steps(snapshot) is None or render.session.open_renderer(SourceKey.of(snapshot, detail)) is None:
             return None

@@ -105,9 +105,9 @@ def _step(effect: PropertyGroup, snapshot: Snapshot, renderer: Renderer, request
 
 
 def _exposed_pairs(renderer: Renderer, request: Request) -> dict[int, set[int]]:
-    """Return, by index of each visible shutter, the pairs of neighboring frames that it exposes as one streak.
+    """Return, by index of each visible shutter, the pairs of neighboring frames between which it does not close.
 
-    It does not close between them. A pair is given by its first frame.
+    A pair is given by its first frame.
     """
     state, pairs = request.state, {}
     shot = renderer.shot(request, known=True)
