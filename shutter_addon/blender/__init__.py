@@ -1,4 +1,7 @@
-"""Everything that uses bpy: properties, the engine, strips, commands."""
+"""The part of the extension that needs bpy, and its registration with Blender.
+
+Blender calls `register` when the extension is enabled and `unregister` when it is disabled.
+"""
 
 from functools import cache
 from importlib import import_module
@@ -19,7 +22,7 @@ _modules += [*features.modules(), *(import_module(f".{name}", __package__) for n
 
 
 def classes_of(module: ModuleType) -> tuple[type, ...]:
-    """Return a module's classes to register: those named SHUTTER_…, and its `classes`."""
+    """Return the Blender classes that a module wants registered: its own named SHUTTER_…, then its tuple `classes`."""
     own = [each for each in vars(module).values() if getattr(each, "__module__", "") == module.__name__]
     named = [each for each in own if isinstance(each, type) and each.__name__.startswith("SHUTTER_")]
     return (*named, *getattr(module, "classes", ()))
@@ -31,7 +34,7 @@ def _command() -> object:
 
 
 def register() -> None:
-    """Register everything with Blender, with the command."""
+    """Register all modules' classes, call the modules' own `register`, and add the command `blender -c shutter`."""
     for module in _modules:
         for cls in classes_of(module):
             bpy.utils.register_class(cls)
@@ -41,7 +44,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Unregister everything."""
+    """Undo `register`, in reverse order."""
     bpy.utils.unregister_cli_command(_command())
     _command.cache_clear()
     for module in reversed(_modules):

@@ -1,7 +1,7 @@
 """The command line: `python -m shutter_addon render …`, or `blender -c shutter render …` in an installed Blender.
 
-Each command is a module of commands/ or of a feature. It has a sentence for `--help`, a function that adds its options,
-and one that runs it.
+Each command, such as `render`, is a module `NAME_command` in commands/ or in a feature. The module has HELP (a sentence
+for `--help`), `add(parser)` (adds its options) and `run(arguments)`.
 """
 
 import argparse
@@ -21,7 +21,14 @@ COMMANDS = "render", "check"
 
 
 def main(argv: list[str]) -> int:
-    """Run a command and return its exit code: 0, 2 after one sentence on stderr, or 130 if it was stopped."""
+    """Parse the arguments, run the command that they name, and return the process's exit code.
+
+    Args:
+        argv: The arguments after the program's name, such as ["render", "a.mp4", "--output", "out"].
+
+    Returns:
+        0 if it succeeded; 2 if not, after one sentence on stderr; film_output.INTERRUPTED (130) if it was stopped.
+    """
     parser, arguments = _parser(), None
     try:
         arguments = parser.parse_args(argv)

@@ -1,4 +1,4 @@
-"""Handlers of Blender's events: loading, saving, changes, undo and renders."""
+"""Handlers of Blender's events: loading, saving, changes, undo and renders. They call what has to react."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def _after_import(imported: bpy.types.BlendImportContext, *_) -> None:
 
 
 def tell(words: str | None) -> None:
-    """Show a sentence about a loaded file, in the window or on stderr."""
+    """Show the user a sentence about a loaded file: in a popup, or on stderr without a window. None: do nothing."""
     if words is None:
         return
     if bpy.app.background:
@@ -110,7 +110,15 @@ def _before_render(scene: Scene, *_) -> None:
 
 
 def _prepare(film: int, in_job: bool) -> bool:
-    """Prepare a film's render on the main thread, whatever thread renders. Return True when done."""
+    """Bring all effects up to date on the main thread before a film is rendered, whatever thread renders.
+
+    Args:
+        film: session_uid of the rendered scene.
+        in_job: Whether a thread of Blender's window renders, for which all effects are read now (job_snapshots).
+
+    Returns:
+        True, which tells the waiting thread that it is done.
+    """
     revision.changed()  # a script may have changed something without an update
     sessions.close_if_device_changed()
     invalidation.drop_failed()
@@ -146,12 +154,12 @@ def _after_render(scene: Scene, *_) -> None:
 
 
 def _uncaught(before: Callable, kind: type, error: BaseException, trace: TracebackType | None) -> None:
-    """Keep errors of the extension for Copy Report.
+    """Keep an error of the extension for *Copy Report*, then print it as before. Installed as sys.excepthook.
 
-    Blender prints what operators, panels, handlers and timers raise, which calls sys.excepthook. Nothing else gets all.
+    Blender calls that for what operators, panels, handlers and timers raise. Nothing else gets all.
 
     Args:
-        before: the hook before this one, which prints them.
+        before: The hook that was installed before, which prints errors.
     """
     recent_errors.exception(error)
     before(kind, error, trace)

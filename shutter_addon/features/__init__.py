@@ -1,9 +1,9 @@
-"""Features that Virtual Shutter works without.
+"""Features that Virtual Shutter works without, and how the rest of the extension finds what they offer.
 
 Each is a folder: its algorithm, and in the folder `blender` what uses bpy. To remove one, delete its folder and its
 name in FEATURES. Modules in `blender` register as those of the package `blender` do. Commands are named …_command.
 
-The rest looks up these names:
+The rest looks up these names in their modules (`each`, `call`, `needed`):
 
 - `SmoothSource`, `steps_for`, `CarriedFile`, `MarkedSubject`, `still_mask`: sources of frames and mattes.
 - `want_matte`, `next_needed`: mattes that previews miss, and the frame that needs a drawing.
@@ -36,7 +36,7 @@ FEATURES = (
 
 @cache
 def modules() -> list[ModuleType]:
-    """Import all modules of the features."""
+    """Import all modules of all features, once, and return them."""
     found = []
     for folder in [import_module(f".{name}{part}", __package__) for name in FEATURES for part in ("", ".blender")]:
         found += [import_module(f".{module.name}", folder.__name__) for module in iter_modules(folder.__path__)]
@@ -44,18 +44,22 @@ def modules() -> list[ModuleType]:
 
 
 def each(name: str) -> Iterator[Any]:
-    """Yield what has this name in the modules of all features."""
+    """Yield the attribute with this name of each module of a feature that has one."""
     return (getattr(module, name) for module in modules() if hasattr(module, name))
 
 
 def call(name: str, *arguments: Any) -> None:
-    """Call the functions of all features that have this name."""
+    """Call the function with this name in each module of a feature that has one."""
     for function in each(name):
         function(*arguments)
 
 
 def needed(name: str) -> Any:
-    """Return what a feature calls `name`. EffectError: the feature was removed."""
+    """Return the attribute with this name of the feature that has one.
+
+    Raises:
+        EffectError: None has: the feature was removed.
+    """
     for found in each(name):
         return found
     raise EffectError(f"this Virtual Shutter was built without {name}")

@@ -1,1 +1,1 @@
-"""The commands of the command line, one module each."""
+"""The commands `render` and `check` of the command line, one module each. Features have more."""

@@ -1,4 +1,7 @@
-"""The command `check`: whether an edit can be rendered on this machine."""
+"""The command `check`: find out, without rendering, whether a saved edit can be rendered on this machine.
+
+It prints what it found on stdout and each fault on stderr. With faults, the exit code is 2.
+"""
 
 import re
 import sys
@@ -53,7 +56,11 @@ def run(arguments: Namespace) -> None:
 
 
 def _checked(arguments: Namespace, scene: Scene, frames: range) -> tuple[str, list[str], list[str]]:
-    """Return the name of the device, notes and faults."""
+    """Choose the render device, and look for everything that would make a render of these frames fail.
+
+    Returns:
+        The device's name ("none" if there is none); notes, which do not prevent a render; faults, which do.
+    """
     faults = [*_version_faults(scene), *_setting_faults(arguments, scene, frames)]
     device, lesser = "none", None
     try:
@@ -72,7 +79,7 @@ def _checked(arguments: Namespace, scene: Scene, frames: range) -> tuple[str, li
 
 
 def _version_faults(scene: Scene) -> list[str]:
-    """Check whether a newer version saved the file."""
+    """Return a sentence for each newer version, of the extension or of Blender, that saved the edit."""
     faults, saved, here = [], scene.virtual_shutter.version, versions.extension()
     if _numbers(saved) > _numbers(here):
         faults.append(f"the edit was saved by version {saved} of the extension, this machine has {here}")
@@ -87,7 +94,7 @@ def _numbers(version: str) -> list[int]:
 
 
 def _setting_faults(arguments: Namespace, scene: Scene, frames: range) -> list[str]:
-    """Check whether the outputs can be written where they are wanted."""
+    """Return why the frames, or the movie that they will be joined to, cannot be written where the options say."""
     read = [arguments.edit, *versions.read_files(scene)]
     faults = external_files.raised(shared_frames.check_resumable, scene) if arguments.resume else []
     if arguments.output:

@@ -1,4 +1,4 @@
-"""Options that several commands have, and reading their inputs."""
+"""What several commands of the command line share: option types, options, and opening footage, recipes and edits."""
 
 import argparse
 import math
@@ -25,21 +25,24 @@ from ..rendering import render_job
 
 
 def to_path(text: str) -> Path:
-    """Parse a path. Leading slashes become one, since Blender takes two for the .blend file's folder."""
+    """Return the absolute path of an option's text, as argparse's `type`.
+
+    Several leading slashes become one, because Blender takes two for the folder of the .blend file.
+    """
     if not text:
         raise argparse.ArgumentTypeError("a name is missing")
     return Path(re.sub("^//+", "/", os.path.abspath(text)))
 
 
 def megabytes(text: str) -> int | None:
-    """Parse a number of megabytes. 0 is None, as without the option."""
+    """Return an option's number of megabytes, as argparse's `type`; None for 0, as if the option were not given."""
     if not text.isdecimal():
         raise argparse.ArgumentTypeError(f"{text!r} is not a number of megabytes")
     return int(text) or None
 
 
 def add_device(parser: argparse.ArgumentParser) -> None:
-    """Add the options for the device that composes pictures."""
+    """Add `--device` and `--gpu-memory`, which choose the device that composes pictures and limit its memory."""
     parser.add_argument(
         "--device",
         choices=available.CHOICES,
@@ -56,7 +59,11 @@ def add_device(parser: argparse.ArgumentParser) -> None:
 
 
 def recipe(path: Path) -> Effect:
-    """Read a recipe. Print a warning if older versions showed another picture. RecipeError: it is invalid."""
+    """Read the effect from a recipe, a JSON file. Print a warning if an older version gave it another picture.
+
+    Raises:
+        RecipeError: The recipe is invalid.
+    """
     found = recipe_file.load(path)
     if found.lost is not None:
         told = f"{path}: {found.lost}"  # not translated
@@ -65,7 +72,7 @@ def recipe(path: Path) -> Effect:
 
 
 def open_footage(path: Path) -> FrameSource:
-    """Open a source. Print a warning about files that were left out."""
+    """Open a movie or an image sequence by its first file. Print a warning if files of the sequence were left out."""
     medium = open_source(path)
     if left_out := medium.left_out:
         render_job.say(left_out)
@@ -73,28 +80,35 @@ def open_footage(path: Path) -> FrameSource:
 
 
 def files(medium: FrameSource) -> list[Path]:
-    """Return the source's files, including those that a sequence lacks, which would belong to it if they appeared."""
+    """Return the paths that the footage reads, which a render must not overwrite.
+
+    For a sequence with gaps these include the missing files: if written, they would become part of it.
+    """
     files = medium.files
     beside = by_number(files[0], listed=True) if len(files) > 1 else None
     return [*files, *(map(beside, range(len(files))) if beside else ())]
 
 
 def length(medium: FrameSource, source_recipe: Effect) -> int:
-    """Return the length of the edit in timeline frames: that of the source, or up to the last key of its time."""
+    """Return the length of the edit in timeline frames: the footage's, or more if the recipe's time has later keys."""
     time = source_recipe.time
     keys = [math.ceil(frame) for frame, _ in time.keys] if isinstance(time, SourceTime) else []
     return min(max([medium.count, *keys]), MAX_FRAME)
 
 
 def open_edit(path: Path, asked: str | None = None, name: str | None = None) -> tuple[Scene, range]:
-    """Open a saved edit without running its scripts, and return its scene and frames.
+    """Open a saved edit without running its scripts.
 
     Args:
-        asked: As in `frames`.
-        name: Of the scene; None: the active one.
+        asked: The text of `--frames`, as in `frames`; None: all frames of the scene.
+        name: The scene to use; None: the active one, which must have strips and no drivers that need scripts.
+
+    Returns:
+        The scene, and the timeline frames that were asked for.
 
     Raises:
-        UserError: The file cannot be opened, or has no such edit or frame.
+        UserError: The file cannot be opened, its scene is missing or set so that the sequencer is not rendered as it
+            is, or it has no such frames.
     """
     if not path.is_file():
         raise UserError(f"{path}: " + ("is no file" if path.exists() else "no such file"))
@@ -123,7 +137,7 @@ def open_edit(path: Path, asked: str | None = None, name: str | None = None) -> 
 
 
 def _scripts(scene: Scene) -> list[tuple]:
-    """Return (owner, driver) of each driver that needs scripts, among the data that the edit renders."""
+    """Return (owner, driver) of each driver in the rendered data that fails because scripts are not run."""
     used = requirements.used_data(scene, range(scene.frame_start, scene.frame_end + 1))
     drivers = [(item, curve.driver) for item in used for curve in _driven(item)]
     complex_ones = [pair for pair in drivers if pair[1].type == "SCRIPTED" and not pair[1].is_simple_expression]
@@ -136,7 +150,7 @@ def _scripts(scene: Scene) -> list[tuple]:
 
 
 def _driven(item: bpy.types.ID) -> list:
-    """Return the driver curves of an ID and of its node tree."""
+    """Return the F-curves of all drivers of a data-block and of its node tree."""
     animations = (getattr(each, "animation_data", None) for each in (item, getattr(item, "node_tree", None)))
     return [curve for animation in animations if animation for curve in animation.drivers]
 
@@ -146,10 +160,15 @@ def _has_strips(scene: Scene) -> bool:
 
 
 def frames(text: str | None, whole: range, what: str = "clip") -> range:
-    """Return the timeline frames of `A:B` (or `A-B`, as schedulers name chunks), of `A` alone, or all frames.
+    """Parse the option `--frames`.
+
+    Args:
+        text: "A:B", "A-B" (as schedulers name chunks) or "A", last frame included; None: the whole range.
+        whole: The frames that can be asked for.
+        what: What has these frames, "clip" or "edit", for the error message.
 
     Raises:
-        OutputError: The clip has no such frames.
+        OutputError: The text is malformed, or its frames are not within `whole`.
     """
     if text is None:
         return whole
@@ -163,7 +182,11 @@ def frames(text: str | None, whole: range, what: str = "clip") -> range:
 
 
 def print_line(text: str) -> None:
-    """Print to stdout, with "?" for characters that the terminal lacks. OutputError: it cannot be written there."""
+    """Print a text to stdout, with "?" for characters that the terminal's encoding lacks.
+
+    Raises:
+        OutputError: stdout cannot be written to; a pipe whose reader has gone is no error.
+    """
     encoding = sys.stdout.encoding or "utf-8"
     try:
         print(text.encode(encoding, "replace").decode(encoding), flush=True)

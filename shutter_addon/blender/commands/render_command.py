@@ -1,4 +1,4 @@
-"""The command `render`: a film of a source and a recipe, or of a saved edit, through Blender's sequencer."""
+"""The command `render`: render footage with a recipe, or a saved edit, through Blender's sequencer."""
 
 import os
 from argparse import ArgumentParser, Namespace
@@ -47,7 +47,7 @@ def run(arguments: Namespace) -> None:
 
 
 def _render_edit(arguments: Namespace) -> None:
-    """Render a saved edit as it is."""
+    """Render the saved edit that the arguments name, unchanged, to frames or a movie."""
     for name in ("recipe", "weights", "save"):
         if getattr(arguments, name) is not None:
             why = "is for a source and a recipe; a saved edit is rendered as it is"
@@ -67,7 +67,7 @@ def _render_edit(arguments: Namespace) -> None:
 
 
 def _render_source(arguments: Namespace) -> None:
-    """Make an edit of a source and a recipe, and render it."""
+    """Make an edit of the footage and the recipe that the arguments name, then render it, save it, or both."""
     if arguments.recipe is None:
         raise film_output.OutputError("--recipe is missing: only a saved edit (.blend) is rendered without one")
     if arguments.resume:
@@ -97,14 +97,16 @@ def _render_source(arguments: Namespace) -> None:
 
 
 def make_edit(path: Path, medium: FrameSource, source_recipe: Effect, folder: Path) -> Scene:
-    """Make an edit of one source strip with an effect, and return its scene.
+    """Replace the open file by a new edit: one strip of footage with an effect strip above it. Return its scene.
 
     Args:
-        medium: the source, opened.
-        folder: of the recipe.
+        path: File of the footage, by which its strips are named.
+        medium: The footage, opened; gives size, frame rate and files.
+        source_recipe: The effect.
+        folder: Folder of the recipe, to which paths of mattes are relative.
 
     Raises:
-        MediaError: a matte of the recipe cannot be read.
+        MediaError: A matte of the recipe cannot be read.
     """
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     scene = bpy.context.scene
@@ -135,7 +137,7 @@ def make_edit(path: Path, medium: FrameSource, source_recipe: Effect, folder: Pa
 
 
 def _written(arguments: Namespace, file_format: str, frames: range) -> list[Path]:
-    """Return all files that a render writes."""
+    """Return all files that the render with these arguments writes: frames or movie, mattes, and the edit."""
     files = [arguments.save] if arguments.save else []
     if arguments.output and film_output.is_movie(arguments.output):
         files.append(arguments.output)
@@ -147,7 +149,14 @@ def _written(arguments: Namespace, file_format: str, frames: range) -> list[Path
 
 
 def _mattes(source_recipe: Effect, folder: Path) -> list[Path]:
-    """Return the files of a recipe's mattes; `folder` is the recipe's. MediaError: a matte is missing."""
+    """Open each matte that a recipe uses, and return their files.
+
+    Args:
+        folder: Folder of the recipe, to which paths of mattes are relative.
+
+    Raises:
+        MediaError: A matte is missing or cannot be read.
+    """
     files = []
     for content in recipe.contents(source_recipe):
         with MatteFile(folder / content.path, content.channel).open() as matte:
@@ -156,10 +165,10 @@ def _mattes(source_recipe: Effect, folder: Path) -> list[Path]:
 
 
 def _save(scene: Scene, path: Path) -> None:
-    """Save the edit with relative paths, so that it can be opened on another machine.
+    """Save the edit to `path` with paths relative to its folder, so that it can be opened on another machine.
 
     Raises:
-        OutputError: It cannot be saved whole; an older file stays.
+        OutputError: It cannot be saved whole; an older file at `path` stays.
     """
     try:
         film_output.make_folder(path.parent)
@@ -178,7 +187,10 @@ _PATHS = {"MOVIE": "filepath", "IMAGE": "directory", "SOUND": "filepath"}  # pat
 
 
 def _paths_relative(scene: Scene, folder: Path) -> AbstractContextManager[None]:
-    """Make the edit's paths relative to the folder of its file, where possible, and restore them afterwards."""
+    """Return a context in which the paths of the edit's strips, images and output are relative to `folder`.
+
+    Paths on another drive stay absolute. All paths are restored at the end.
+    """
     owners = [(scene.render, "filepath")]
     for strip in scene.sequence_editor.strips_all:
         if strip.type in _PATHS:

@@ -1,1 +1,1 @@
-"""Read and write what Blender stores of an effect."""
+"""Read and write what Blender stores of an effect: properties, F-curves, strips, annotations and files."""

@@ -1,4 +1,7 @@
-"""Scribbles: annotation layers and strokes, and the transform between an effect's picture and the sequencer's image."""
+"""Strokes as annotations: their layers, and the matrices between an effect's picture and the sequencer's preview.
+
+Blender stores annotations in the sequencer's image space: pixels, origin at the image's center, y up.
+"""
 
 from typing import Any
 
@@ -21,20 +24,20 @@ TRANSFORM = ("offset_x", "offset_y", "scale_x", "scale_y", "rotation")
 
 
 def picture_size(effect: PropertyGroup) -> tuple[int, int]:
-    """Return width and height of the effect's picture, which are its source's."""
+    """Return the width and height of an effect's picture in pixels, which its scene takes from the source."""
     return effect.scene.render.resolution_x, effect.scene.render.resolution_y
 
 
 @np.errstate(invalid="ignore")  # image_to_picture reports a result that is not finite
 def picture_to_image(strip: Strip, size: tuple[int, int], **moved: float) -> np.ndarray:
-    """Return the matrix (3, 3) from fractions of the strip's picture to the sequencer's image space.
+    """Return the matrix (3, 3) from a strip's picture, in fractions 0 to 1, to the sequencer's image space.
 
-    Annotations use image space: pixels, origin at the image's center, y up. Blender scales and turns a strip about its
-    transform's origin, and mirrors the whole image after that.
+    It follows the strip's transform. Blender scales and turns a strip about the transform's origin, then mirrors the
+    image.
 
     Args:
         size: The picture's width and height in pixels.
-        moved: Properties of the transform, in place of the strip's own.
+        moved: Values by name of the transform's properties, in place of the strip's own; for keyed transforms.
     """
     width, height = size
     x, y, scale_x, scale_y, rotation = (moved.get(name, getattr(strip.transform, name)) for name in TRANSFORM)
@@ -49,18 +52,18 @@ def picture_to_image(strip: Strip, size: tuple[int, int], **moved: float) -> np.
 
 
 def is_invertible(matrix: np.ndarray) -> bool:
-    """Tell whether a matrix (3, 3) has an inverse: a strip may have scale 0, and a file may hold NaN."""
+    """Tell whether a matrix (3, 3) has a finite inverse. Not if a strip's scale is 0, or a file holds NaN."""
     with np.errstate(all="ignore"):
         return bool(np.isfinite(matrix).all() and np.isfinite(1 / np.linalg.det(matrix)))
 
 
 def picture_to_region(strip: Strip, size: tuple[int, int], region: Region) -> np.ndarray:
-    """Return the matrix (3, 3) from fractions of the strip's picture to pixels of a preview's region."""
+    """Return the matrix (3, 3) from a strip's picture, in fractions 0 to 1, to pixels of the preview."""
     return image_to_region(region) @ picture_to_image(strip, size)
 
 
 def image_to_region(region: Region) -> np.ndarray:
-    """Return the matrix (3, 3) from the sequencer's image space to pixels of a preview's region."""
+    """Return the matrix (3, 3) from the sequencer's image space to pixels of the preview, at its zoom and pan."""
     # region_to_view does not round to whole pixels. The last pixel is at the edge of the drawn area.
     corners = (0, 0), (region.width - 1, region.height - 1)
     (left, bottom), (right, top) = (region.view2d.region_to_view(*corner) for corner in corners)
@@ -71,12 +74,10 @@ def image_to_region(region: Region) -> np.ndarray:
 
 
 def image_to_picture(strip: Strip, size: tuple[int, int], **moved: float) -> np.ndarray | None:
-    """Return the matrix (3, 3) from the sequencer's image to fractions of the strip's picture.
-
-    None: the strip is too small to be seen. `size` and `moved` are as in picture_to_image.
+    """Return the inverse of picture_to_image, with its arguments; None: the strip is shown too small for scribbles.
 
     Raises:
-        EffectError: A number of its transform is not finite.
+        EffectError: A number of the strip's transform is not finite.
     """
     matrix = picture_to_image(strip, size, **moved)
     if not np.isfinite(matrix).all():
@@ -87,13 +88,16 @@ def image_to_picture(strip: Strip, size: tuple[int, int], **moved: float) -> np.
 
 
 def strokes_of(drawing: AnnotationFrame) -> list[np.ndarray]:
-    """Return the strokes (n, 2) float64 of an annotation's frame in image space, without empty ones."""
+    """Return the strokes that an annotation layer has at one frame, each as points (n, 2) float64 in image space.
+
+    Empty strokes are left out.
+    """
     strokes = [numbers(stroke.points, "co", size=3)[:, :2].astype(np.float64) for stroke in drawing.strokes]
     return [points for points in strokes if len(points)]
 
 
 def add_stroke(drawing: AnnotationFrame, points: np.ndarray) -> None:
-    """Add a stroke (n, 2) in image space to an annotation's frame."""
+    """Add a stroke of points (n, 2), in image space, to what an annotation layer has at one frame."""
     stroke = drawing.strokes.new()
     stroke.display_mode = "2DSPACE"
     stroke.points.add(len(points))
@@ -103,24 +107,24 @@ def add_stroke(drawing: AnnotationFrame, points: np.ndarray) -> None:
 
 
 def layer_of(effect: PropertyGroup, region: PropertyGroup, name: str = "layer") -> Any:
-    """Return the annotation layer that a region names in a property, one of LAYERS, or None."""
+    """Return the annotation layer that a region names in its property `name`, one of LAYERS; None: there is none."""
     annotation = effect.scene and effect.scene.annotation
     return annotation.layers.get(getattr(region, name)) if annotation else None
 
 
 def layers_of(effect: PropertyGroup, region: PropertyGroup) -> list:
-    """Return all annotation layers of a region."""
+    """Return all annotation layers of a region: of its strokes and, for a subject, of its other LAYERS."""
     return [layer for name in LAYERS if (layer := layer_of(effect, region, name)) is not None]
 
 
 def annotation(effect: PropertyGroup) -> Annotation:
-    """Return the annotation of the effect's scribbles, made again where it was removed."""
+    """Return the annotation that holds an effect's scribbles. Make a new one if it was removed."""
     if effect.scene.annotation is None:
         new_annotation(effect.scene, data_("Scribbles {effect}").format(effect=effect.name))
     return effect.scene.annotation
 
 
 def new_annotation(scene: Scene, name: str) -> None:
-    """Give an effect's scene an empty annotation, which is removed with it."""
+    """Give an effect scene a new, empty annotation, marked so that it is removed together with the effect."""
     scene.annotation = bpy.data.annotations.new(name)
     scene.annotation.virtual_shutter_made = scene.virtual_shutter.identity

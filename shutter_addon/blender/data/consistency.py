@@ -1,4 +1,4 @@
-"""Keep parts of an effect consistent: bars with the window, regions with shutters' names, scribbles with colors."""
+"""Keep an effect consistent when a part of it is edited: bars fit the window, regions follow their shutters."""
 
 from collections.abc import Callable, Container
 
@@ -14,19 +14,29 @@ from .selection import active_region, own_regions
 
 
 def changed(group: PropertyGroup, _context: Context) -> None:
-    """Drop finished frames, as an update callback: the sequencer does not know what effect strips depend on."""
+    """Have the effect's frames made again after a property changed, as its update callback.
+
+    Blender's sequencer keeps finished frames and does not know that they depend on the property.
+    """
     strips.invalidate(group.id_data)
 
 
 def choose_region(effect: PropertyGroup) -> None:
-    """Make the nearest region of the active shutter active, unless one is: the list shows only those."""
+    """Make a region of the active shutter active, the nearest in order, unless one already is.
+
+    The list of regions shows only those of the active shutter.
+    """
     own = own_regions(effect)
     if own and effect.active_region not in own:
         effect.active_region = min(own, key=lambda i: abs(i - effect.active_region))
 
 
 def aim_pen(effect: PropertyGroup, name: str = "layer") -> None:
-    """Make strokes go to a layer of the active region. `name` is one of annotations.LAYERS."""
+    """Make Blender's annotation tool draw on an annotation layer of the active region.
+
+    Args:
+        name: One of annotations.LAYERS: which of the region's layers.
+    """
     region = active_region(effect)
     layer = layer_of(effect, region, name) if region else None
     if layer is not None:
@@ -35,7 +45,10 @@ def aim_pen(effect: PropertyGroup, name: str = "layer") -> None:
 
 
 def unique(name: str, taken: Container[str]) -> str:
-    """Return a name, cut as in recipes, with a number where it is taken, as Blender names things."""
+    """Return a name that is not in `taken`: the name itself, or with a number, as in "Name.001".
+
+    It has at most limits.MAX_NAME characters, as in recipes.
+    """
     number, wanted = 0, name[: limits.MAX_NAME]
     while wanted in taken:
         number += 1
@@ -45,7 +58,12 @@ def unique(name: str, taken: Container[str]) -> str:
 
 
 def rename(effect: PropertyGroup, old: str, new: str) -> str:
-    """Return a unique name for a shutter, and let its regions follow."""
+    """Return the name to give a renamed shutter, made unique, and enter it in the regions of the shutter.
+
+    Args:
+        old: The shutter's name until now.
+        new: The name that was typed.
+    """
     others = [shutter.name for shutter in effect.shutters]
     others.remove(old)
     new = unique(new, others)
@@ -58,7 +76,13 @@ def rename(effect: PropertyGroup, old: str, new: str) -> str:
 
 
 def refollow(effect: PropertyGroup, old: str, new: str | None) -> None:
-    """Let shutters follow a renamed region, or nothing if it is gone. Nothing changes if another has the old name."""
+    """Update the shutters whose exposure follows a region, after it was renamed or removed.
+
+    Nothing changes if another region still has the old name.
+
+    Args:
+        new: The region's new name; None: it was removed, and the shutters follow nothing.
+    """
     if [region.name for region in effect.regions].count(old) > (0 if new is None else 1):
         return
     for shutter in effect.shutters:
@@ -69,15 +93,15 @@ def refollow(effect: PropertyGroup, old: str, new: str | None) -> None:
 
 
 def bars(shutter: PropertyGroup) -> np.ndarray:
-    """Return a shutter's bars without keys, float64 (L,)."""
+    """Return a shutter's stored bars, float64 (L,): how much each frame of its window counts, apart from keys."""
     return numbers(shutter.bars, "weight").astype(np.float64)
 
 
 def fit_bars(effect: PropertyGroup) -> None:
-    """Fit bars after the window's length or position has changed.
+    """Fit all shutters' bars (how much each frame counts) after the window's length or position has changed.
 
-    Shutters that keep to a preset get its bars. Others lose the preset. Their bars, at keys too, keep their shape and
-    share of light.
+    A shutter whose bars are still those of its preset gets the preset's bars for the new window. Any other loses its
+    preset; its bars, at keys too, are resampled, which keeps their shape and their share of the light.
     """
     for index, shutter in enumerate(effect.shutters):
         shutter.preset = preset_of(effect, index)
@@ -90,7 +114,7 @@ def fit_bars(effect: PropertyGroup) -> None:
 
 
 def count_filmed(effect: PropertyGroup) -> None:
-    """Convert an effect of format 1, whose bars counted moments between filmed frames, to bars of filmed frames.
+    """Convert an effect of format 1, whose bars counted moments between frames, too, to bars of the footage's frames.
 
     Raises:
         EffectError: A value is out of range.
@@ -109,9 +133,9 @@ def count_filmed(effect: PropertyGroup) -> None:
 
 
 def preset_of(effect: PropertyGroup, index: int) -> str:
-    """Return the preset that a shutter keeps to, a key of shutters.PRESETS, or "".
+    """Return the preset that a shutter still has, a key of shutters.PRESETS; "": it has none.
 
-    That is its last preset, as long as the bars are not edited or keyed.
+    It has its last preset as long as its bars are neither edited nor keyed.
     """
     shutter, weights = effect.shutters[index], bars(effect.shutters[index])
     if shutter.preset not in shutters.PRESETS or not weights.size:
@@ -123,7 +147,12 @@ def preset_of(effect: PropertyGroup, index: int) -> str:
 
 
 def _change_bars(effect: PropertyGroup, index: int, change: Callable[..., np.ndarray]) -> None:
-    """Apply a function to a shutter's bars, and to their values at all keys. It may change their number."""
+    """Replace a shutter's bars (how much each frame counts) by `change(bars)`, also at each key.
+
+    Args:
+        index: Of the shutter.
+        change: Takes the bars (L,) and returns new ones, maybe of another number.
+    """
     shutter = effect.shutters[index]
     scene, path = effect.id_data, f"{effect.path_from_id()}.shutters[{index}].bars"
     curves = fcurves.Curves(scene)
@@ -141,14 +170,19 @@ def _change_bars(effect: PropertyGroup, index: int, change: Callable[..., np.nda
 
 
 def _bars_keyed(old: np.ndarray, keyed: dict[int, FCurve], frame: float) -> np.ndarray:
-    """Return the bars at a frame, where F-curves drive some of them."""
+    """Return a shutter's bars (L,) at a timeline frame: the values of F-curves, at least 0, and `old` for the others.
+
+    Args:
+        old: The stored bars (L,).
+        keyed: F-curves by the index of their bar.
+    """
     weights = old.copy()
     weights[list(keyed)] = [max(curve.evaluate(frame), 0.0) for curve in keyed.values()]
     return weights
 
 
 def color_layers(effect: PropertyGroup, shutter: PropertyGroup) -> None:
-    """Give scribbles the color of their shutter."""
+    """Give the annotation layers of a shutter's regions the shutter's color, except those of *Not This* strokes."""
     for region in effect.regions:
         for layer in layers_of(effect, region) if region.shutter == shutter.name else ():
             if layer.info != region.not_layer:

@@ -1,7 +1,7 @@
-"""The format of data in .blend files: a number on each scene with effects.
+"""The format of an effect's data in .blend files, a number on each scene with effects, and migration of older formats.
 
-Files of a newer format open. Unknown data stays as it is stored, without being shown, and nothing is tidied
-automatically.
+Files of a newer format open. What is unknown in them stays as it is stored but is not shown, and nothing in them is
+changed automatically.
 """
 
 from collections.abc import Iterable
@@ -16,22 +16,22 @@ FORMAT = 2
 
 
 def is_newer(scene) -> bool:
-    """Tell whether a scene's effects have a newer format than this version knows."""
+    """Tell whether a newer version saved a scene's effects, in a format that this version does not know."""
     return scene.virtual_shutter.format > FORMAT
 
 
 def is_file_newer() -> bool:
-    """Tell whether any scene that can be changed is newer. Then only the user's changes are written."""
+    """Tell whether a newer version saved any scene that can be changed. Then only the user's changes are written."""
     return any(map(is_newer, strips.local_scenes()))
 
 
 def new_effect(scene, number: int):
-    """Add an effect to a scene, and set the scene's format to the oldest of its effects, unless it is newer.
+    """Add an effect to a scene and return it. Set the scene's format to the oldest of its effects', unless it is newer.
 
-    Done here because no handler runs before an autosave.
+    The format is set at once because no handler runs before an autosave.
 
     Args:
-        number: Format of the data that fills the effect.
+        number: Format of the data that the effect will be filled with.
     """
     group = scene.virtual_shutter
     if not is_newer(scene):
@@ -40,7 +40,10 @@ def new_effect(scene, number: int):
 
 
 def migrate() -> None:
-    """Migrate the loaded file, and set the format of all scenes with effects. No handler runs before an autosave."""
+    """Convert all effects of the loaded file to the current format, and mark their scenes with it.
+
+    Done on loading, because no handler runs before an autosave.
+    """
     for group in [scene.virtual_shutter for scene in _scenes_with_effects()]:
         for effect in group.effects if group.format < 2 else ():
             if effect.inbetween not in ("1", "AUTO"):  # bars count filmed frames now; repeated frames still count
@@ -50,7 +53,7 @@ def migrate() -> None:
 
 
 def stamp_saved(version: str) -> None:
-    """Set the version that saves the scenes with effects.
+    """Write the extension's version into all scenes with effects, before the file is saved.
 
     Their format stays: a scene that was appended from an older file migrates when the file is loaded.
     """
@@ -59,7 +62,7 @@ def stamp_saved(version: str) -> None:
 
 
 def note(scenes: Iterable) -> str | None:
-    """Return a sentence about the first scene with effects of a newer format, or None."""
+    """Return a warning for the user about the first scene with effects of a newer format; None: there is none."""
     newer = next(filter(is_newer, scenes), None)
     if newer is None:
         return None

@@ -1,10 +1,11 @@
-"""The script that a second Blender runs to decode movies. It reads questions on stdin and answers on stdout.
+"""The script that a second Blender runs to decode movies where PyAV is missing (media/blender_movie.py).
 
-That Blender does not load the extension. A question is a line of JSON with `number`, `path` and `deinterlace` of a
-movie, and `wanted`: "about", "close", or a frame's index. A file may be open several times under different numbers.
+That Blender does not load the extension. The script reads questions on stdin and answers on stdout. A question is a
+line of JSON: `number` identifies a movie, `path` and `deinterlace` say how to open it, and `wanted` is "about", "close"
+or a frame's index. A file may be open several times under different numbers.
 
 An answer begins with a line: a mark, which is the script's last argument, and JSON. The JSON's `bytes` says how many
-bytes of a frame follow.
+bytes of a frame follow. The mark tells answers from what Blender prints.
 """
 
 import contextlib
@@ -17,7 +18,7 @@ import numpy as np
 
 
 class Movie:
-    """An open movie. Frames count from 0."""
+    """A movie that is open in Blender as an image. Frames count from 0."""
 
     def __init__(self, path: str, deinterlace: bool) -> None:
         self._path = path
@@ -33,7 +34,11 @@ class Movie:
         bpy.data.images.remove(self._image)
 
     def about(self) -> dict:
-        """Return the movie's properties, with as many frames as a strip of it has. RuntimeError: it is no movie."""
+        """Return the movie's size, number of frames, frame rate, and whether it has alpha, deep samples or audio.
+
+        Raises:
+            RuntimeError: The file is no movie that Blender can decode.
+        """
         if self._image.source != "MOVIE":
             raise RuntimeError("Blender knows no such movie")
         frame = self.frame(0)
@@ -53,10 +58,10 @@ class Movie:
             bpy.data.sounds.remove(sound)
 
     def frame(self, index: int) -> np.ndarray:
-        """Return a frame as RGBA (H, W, 4), top row first: uint8, or uint16 for deeper movies.
+        """Return a frame as RGBA (H, W, 4), top row first: uint8, or uint16 for movies with deeper samples.
 
         Raises:
-            RuntimeError: It cannot be decoded.
+            RuntimeError: Blender cannot decode it.
         """
         self._look.image_user.frame_current = index + 1
         self._look.evaluate((0, 0, 0))
@@ -76,7 +81,14 @@ class Movie:
 def _answer(
     movies: dict[int, Movie], wanted: str | int, number: int, path: str, deinterlace: bool
 ) -> tuple[dict, np.ndarray | None]:
-    """Return the line and the bytes of an answer. `movies` are open, by number."""
+    """Do what a question asks; the arguments are its fields.
+
+    Args:
+        movies: The open movies by number, to which a new one is added.
+
+    Returns:
+        The answer's JSON as a dictionary, with "error" if it failed, and the frame, or None.
+    """
     try:
         if wanted == "close":
             _close(movies, number)
@@ -98,7 +110,7 @@ def _close(movies: dict[int, Movie], number: int) -> None:
 
 
 def main() -> None:
-    """Answer questions from stdin until it ends."""
+    """Answer questions from stdin until it closes."""
     # Nothing else that Blender prints may be taken for an answer.
     questions, answers = (os.fdopen(os.dup(number), mode) for number, mode in ((0, "rb"), (1, "wb")))
     os.dup2(os.open(os.devnull, os.O_RDWR), 1)

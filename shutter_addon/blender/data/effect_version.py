@@ -1,7 +1,7 @@
-"""What an effect's pictures depend on, in one list for previews and bakes.
+"""Keys of everything that an effect's pictures depend on, so that previews and bakes notice when they are out of date.
 
-Previews drop finished frames when it changes. A bake stores a hash of it, which is the same wherever the strips lie on
-the timeline and the files on disk.
+Previews drop finished frames when `preview_key` changes. A bake stores `key`, a hash that stays the same when the
+strips are moved on the timeline or the files on disk.
 """
 
 import hashlib
@@ -33,13 +33,19 @@ _BEZIER = 2  # of Keyframe.interpolation as a number; those above have parameter
 
 
 def frames_of(strip: Strip) -> range:
-    """Return the frames that an effect strip shows, from its origin: comparable between parts of a cut strip."""
+    """Return the frames that an effect strip shows, counted from strips.origin.
+
+    That is where its content would start untrimmed, so the parts of a cut strip have comparable frames.
+    """
     start = round(strips.origin(strip))
     return range(strip.left_handle - start, strip.right_handle - start)
 
 
 def key(scene: Scene, effect: PropertyGroup, strip: Strip, frames: range) -> str:
-    """Return 16 hexadecimal digits that identify an effect's pictures at frames as in frames_of.
+    """Return 16 hexadecimal digits that identify an effect's pictures, by its settings and the contents of files.
+
+    Args:
+        frames: Counted as in frames_of.
 
     Raises:
         EffectError, MediaError: The effect cannot be shown.
@@ -60,7 +66,10 @@ def key(scene: Scene, effect: PropertyGroup, strip: Strip, frames: range) -> str
 
 
 def preview_key(scene: Scene, effect: PropertyGroup, strip: Strip) -> int:
-    """Return a number that changes with an effect's pictures, except by properties with an update callback."""
+    """Return a number that changes with what an effect's pictures depend on, where Blender does not report a change.
+
+    So properties with an update callback do not count. It is asked for often, so files count by path, size and time.
+    """
     source = strips.nearest_source(scene, effect, strip)
     lies = None if source is None else (source.left_handle, _source(effect, source, _stamps, 0))
     names = tuple(shutter.name for shutter in effect.shutters)
@@ -68,7 +77,7 @@ def preview_key(scene: Scene, effect: PropertyGroup, strip: Strip) -> int:
 
 
 def is_changed(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
-    """Tell whether an effect has changed since its strip was baked, or cannot be shown any more."""
+    """Tell whether an effect differs from what its strip was baked with, or cannot be shown any more."""
     bake, frames = strip.virtual_shutter_bake, frames_of(strip)
     if frames.start < bake.first or frames.stop > bake.first + bake.count:
         return True  # the strip is longer now
@@ -79,12 +88,15 @@ def is_changed(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
 
 
 def parts(effect: PropertyGroup, strip: Strip, files: Files, start: int | None = None) -> Iterator[Hashable]:
-    """Yield what an effect's pictures depend on, except the source and properties with an update callback.
+    """Yield all that an effect's pictures depend on, except the source and properties with an update callback.
 
-    Values of keyed properties do not count, as they change with every frame that plays.
+    These are bars, regions, strokes, mattes, F-curves and the strip's transform. The values of keyed properties do not
+    count, since they change with every frame that plays.
 
     Args:
-        start: Timeline frame that frames count from, so that moved strips give the same. None: they do not.
+        files: Identifies the files of a strip or of an image matte: `_stamps` or `_contents`.
+        start: Timeline frame to count frames from, so that moved strips give the same; None: count as the timeline
+            does.
     """
     scene, names = effect.id_data, [shutter.name for shutter in effect.shutters]
     yield tuple(len(shutter.bars) for shutter in effect.shutters)
@@ -104,12 +116,20 @@ def parts(effect: PropertyGroup, strip: Strip, files: Files, start: int | None =
 
 
 def _source(effect: PropertyGroup, source: Strip, files: Files, start: int) -> Hashable:
-    """Return what an effect's source shows, and when."""
+    """Return what identifies the frames of an effect's source, and which of them it shows when.
+
+    Args:
+        files: As in `parts`.
+        start: Timeline frame to count frames from.
+    """
     return None if effect.use_source_time else timing(source, start), files(source)
 
 
 def _settings(effect: PropertyGroup) -> Iterator[Hashable]:
-    """Yield an effect's properties that are not keyed, except names and colors."""
+    """Yield names and values of an effect's properties that pictures depend on, except those with keys.
+
+    Names and colors do not count; names that refer to something count as its index.
+    """
     path, followed = effect.path_from_id(), [region.name for region in effect.regions]
     curves = filter(fcurves.drives, fcurves.curves_under(effect.id_data, path + "."))
     keyed = {(curve.data_path, curve.array_index) for curve in curves}
@@ -137,13 +157,17 @@ def _settings(effect: PropertyGroup) -> Iterator[Hashable]:
 
 
 def _setting_names(*kinds: type) -> list[str]:
-    """Return the properties of the model's fields, except names and colors."""
+    """Return the names of Blender's properties for the fields of the model's classes, except texts and colors."""
     fields = fields_of(*kinds).values()
     return [field.blender for field in fields if field.choices or not isinstance(field.default, str | tuple)]
 
 
 def _curves(owner: Scene, path: str, start: int | None) -> Iterator[Hashable]:
-    """Yield what the F-curves say whose path starts with `path`, in the order of their paths."""
+    """Yield paths, keys, handles and modifiers of the F-curves whose path starts with `path`, ordered by path.
+
+    Args:
+        start: As in `parts`.
+    """
     for curve in sorted(fcurves.curves_under(owner, path), key=lambda curve: (curve.data_path, curve.array_index)):
         yield curve.data_path.removeprefix(path), curve.array_index, curve.mute, curve.extrapolation
         points = curve.keyframe_points
@@ -171,7 +195,12 @@ def _strokes(effect: PropertyGroup, region: PropertyGroup, start: int | None) ->
 
 
 def _matte(region: PropertyGroup, files: Files, start: int | None) -> Iterator[Hashable]:
-    """Yield what a matte shows, except properties of the region."""
+    """Yield what a region's matte shows: its files, strips or mask. Properties of the region itself are not included.
+
+    Args:
+        files: As in `parts`.
+        start: As in `parts`.
+    """
     try:
         if region.matte == "IMAGE":
             yield files(region)
@@ -188,14 +217,21 @@ def _matte(region: PropertyGroup, files: Files, start: int | None) -> Iterator[H
 
 
 def timing(strip: Strip, start: int = 0) -> StripTiming:
-    """Return how a movie, image or clip strip lies on the timeline, without its name and cuts."""
+    """Return when a movie, image or clip strip shows which of its frames, whatever its name and cuts.
+
+    Args:
+        start: Timeline frame that its start and end are counted from.
+    """
     lies = source_media.timing_of(strip)
     begins, ends = lies.content_start - start, lies.content_end - start
     return replace(lies, name="", left_handle=0, content_start=begins, content_end=ends)
 
 
 def _stamps(owner: Strip | PropertyGroup) -> Hashable:
-    """Return a key of the files of a strip or an image matte, as they are on disk now, or why there is none."""
+    """Return a value that changes when the files of a strip or an image matte change, by their stamps on disk.
+
+    If they cannot be found, the value is the error message.
+    """
     try:
         return source_media.media_key(owner) if isinstance(owner, Strip) else matte_content.image_file(owner)
     except (MediaError, EffectError) as error:
@@ -203,7 +239,7 @@ def _stamps(owner: Strip | PropertyGroup) -> Hashable:
 
 
 def _contents(owner: Strip | PropertyGroup) -> Hashable:
-    """Return how the files of a strip or of a region's matte are read, and digests of their contents.
+    """Return how the files of a strip or an image matte are read, and digests of their contents.
 
     Raises:
         EffectError, MediaError: It has no files.

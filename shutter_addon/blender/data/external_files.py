@@ -1,4 +1,4 @@
-"""Files that data-blocks name: images, volumes, sounds, libraries; and faults of those that an edit needs."""
+"""Files outside the .blend file that its data-blocks name, and which of those that an edit needs are missing."""
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -16,7 +16,10 @@ from . import requirements, strips
 
 
 def named(item: ID) -> list[Path]:
-    """Return a data-block's file: several of a tiled image, a sequence's first, none of a packed or generated one."""
+    """Return the files that a data-block names: several for a tiled image, only the first for an image sequence.
+
+    Packed and generated images have none.
+    """
     source = getattr(item, "source", "FILE")
     if source in ("GENERATED", "VIEWER") or item.filepath in ("", "<builtin>") or getattr(item, "packed_file", None):
         return []
@@ -26,7 +29,7 @@ def named(item: ID) -> list[Path]:
 
 
 def every(item: ID) -> list[Path]:
-    """Return the files as `named` does, but all of a sequence, in order."""
+    """Return the files as `named` does, but for an image sequence all of its files, in order."""
     files = named(item)
     if getattr(item, "is_sequence", False) or getattr(item, "source", "") == "SEQUENCE":
         with suppress(MediaError):
@@ -35,16 +38,21 @@ def every(item: ID) -> list[Path]:
 
 
 def absolute(owner: ID | Strip, path: str) -> Path:
-    """Return the absolute path of a file that a data-block or a strip names."""
+    """Return the absolute path of a file that a data-block or a strip names.
+
+    Args:
+        owner: The data-block or strip; a path that begins with // is relative to the .blend file that has it.
+        path: As stored.
+    """
     library = owner.library if isinstance(owner, bpy.types.ID) else owner.id_data.library
     return Path(bpy.path.abspath(path, library=library))
 
 
 def faults(scene: Scene, frames: range, *, sources: bool) -> list[str]:
-    """Return a sentence for each file that pictures of these frames need and that is missing or unreadable.
+    """Return a sentence for each file that is missing or unreadable and that pictures at these timeline frames need.
 
     These are files of movie, image and clip strips, of images, volumes, caches and fonts that are shown, and of
-    libraries. Edits in Scene strips count as a whole. Files of mattes are left out.
+    libraries. Edits in Scene strips count at all their frames. Files of mattes are left out.
 
     Args:
         sources: Include the source strips of effects, as far as they are shown themselves.
@@ -58,7 +66,7 @@ def faults(scene: Scene, frames: range, *, sources: bool) -> list[str]:
 
 
 def sound_faults(scene: Scene, frames: range) -> list[str]:
-    """Return faults of sound strips, as `faults` does."""
+    """Return a sentence for each sound strip at these timeline frames whose file is missing or unreadable."""
     return _of_strips(scene, frames, ("SOUND",), sources=False)
 
 
@@ -87,13 +95,17 @@ def _of_strip(strip: Strip, frames: range) -> Iterator[str]:
 
 
 def _of_item(item: ID, check: Callable = check_file) -> Iterator[str]:
-    """Yield faults of a data-block's files; of a sequence, of its first. `check` raises MediaError for a file."""
+    """Yield a sentence for each fault of a data-block's files; of an image sequence only the first file is checked.
+
+    Args:
+        check: Takes a file's path and raises MediaError if it is missing or unreadable.
+    """
     for path in named(item):
         yield from raised(check, path)
 
 
 def raised(check: Callable, *arguments) -> list[str]:
-    """Return the message of the error that a check of `arguments` raises, if it does."""
+    """Call `check(*arguments)` and return the message of its UserError or OSError in a list, empty without an error."""
     try:
         check(*arguments)
     except (UserError, OSError) as error:

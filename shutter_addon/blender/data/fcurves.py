@@ -1,6 +1,7 @@
-"""F-curves of a scene, evaluated at any frame.
+"""Read and write the F-curves of a scene: find, evaluate at any timeline frame, key, copy and remove.
 
-The engine gets the effect scene's depsgraph, which does not contain other scenes' animation.
+F-curves are evaluated here because the engine gets the effect scene's depsgraph, which does not contain the animation
+of the scene that has the effect.
 """
 
 import re
@@ -20,13 +21,13 @@ _EASES: dict[int, Ease] = {0: "constant", 1: "linear", 2: "bezier"}
 
 
 def stretched(scene) -> float:
-    """Return the time stretching of Output Properties: how far F-curves advance in a frame of the timeline."""
+    """Return how many frames F-curves advance in one timeline frame: *Time Stretching* of Output Properties."""
     render = getattr(scene, "render", None)  # clips have none
     return render.frame_map_old / render.frame_map_new if render else 1.0
 
 
 class Timed:
-    """An F-curve in frames of a scene's timeline, which may be stretched."""
+    """An F-curve whose methods take and return frames of the timeline, where *Time Stretching* makes them differ."""
 
     def __init__(self, curve, scene):
         self._curve, self._pace = curve, stretched(scene)
@@ -38,19 +39,19 @@ class Timed:
         return self._curve.evaluate(frame * self._pace)
 
     def points(self) -> np.ndarray:
-        """Return frames and values (n, 2) of the keys."""
+        """Return timeline frame and value of each key, (n, 2)."""
         points = points_of(self._curve)
         if self._pace != 1:  # rounded, so that a key set at a whole frame stays there
             points[:, 0] = np.round(points[:, 0] / self._pace, 3)
         return points
 
     def insert(self, frame: float, value: float, **how):
-        """Insert a key as keyframe_points.insert does."""
+        """Insert a key at a timeline frame, with the keyword arguments of Blender's keyframe_points.insert."""
         return self._curve.keyframe_points.insert(frame * self._pace, value, **how)
 
 
 class Curves:
-    """The F-curves of a scene by path."""
+    """The F-curves of a scene by data path. Muted and empty ones are left out, since they have no effect."""
 
     def __init__(self, scene):
         self._pace = stretched(scene)
@@ -58,19 +59,34 @@ class Curves:
         self._curves = {(c.data_path, c.array_index): c if self._pace == 1 else Timed(c, scene) for c in found}
 
     def find(self, path: str, index: int = 0):
-        """Return the F-curve of a property, or None; muted and empty ones do not count."""
+        """Return the F-curve of a property.
+
+        Args:
+            path: Data path of the property from the scene.
+            index: Component of a vector; else 0.
+
+        Returns:
+            None if the property has none that is in effect.
+        """
         return self._curves.get((path, index))
 
     def of(self, owner, path: str, name: str) -> list:
-        """Return the F-curves of a property's components. `path` is the owner's, from the scene."""
+        """Return the F-curves of a property: at most one for a number, one for each keyed component of a vector.
+
+        Args:
+            owner: The struct that has the property.
+            path: Data path of `owner` from the scene.
+            name: Name of the property.
+        """
         length = getattr(owner.bl_rna.properties[name], "array_length", 0)
         all_curves = (self.find(f"{path}.{name}", index) for index in range(max(length, 1)))
         return [curve for curve in all_curves if curve is not None]
 
     def keys(self, curves: list) -> tuple[tuple[float, Ease], ...]:
-        """Return the frames with a key on any of the curves, ascending, with eases as recipes name them.
+        """Return the timeline frames at which any of the curves has a key, ascending, each with its ease.
 
-        The first curve with a key on a frame gives its ease.
+        The ease says how values go on to the next key: "constant", "linear" or "bezier". The first curve with a key on
+        a frame gives it.
         """
         eases: dict[float, Ease] = {}
         for curve in curves:
@@ -80,10 +96,14 @@ class Curves:
         return tuple(sorted(eases.items()))
 
     def value(self, owner, path: str, name: str, frame: float):
-        """Return a float, or a vector as a list, at a frame. `path` is the owner's, from the scene.
+        """Return a float property, or a vector as a list, at a timeline frame, evaluated where it has F-curves.
+
+        Args:
+            owner: The struct that has the property.
+            path: Data path of `owner` from the scene.
 
         Raises:
-            EffectError: It is out of range.
+            EffectError: A value is out of the property's range.
         """
         value = getattr(owner, name)
         if isinstance(value, float):
@@ -100,32 +120,39 @@ class Curves:
 
 
 def numbers(items: bpy_prop_collection, name: str, kind: type = np.float32, size: int = 1) -> np.ndarray:
-    """Return a property of all items: (n,), or (n, size) for a vector; enums as numbers."""
+    """Return a property of all items of a collection: (n,), or (n, size) for a vector; enums as their numbers."""
     values: np.ndarray = np.empty(len(items) * size, kind)
     items.foreach_get(name, values)
     return values if size == 1 else values.reshape(-1, size)
 
 
 def points_of(curve) -> np.ndarray:
-    """Return frames and values (n, 2) of an F-curve's keys."""
+    """Return frame and value of each key of an F-curve, (n, 2), in its own frames: not stretched."""
     return numbers(curve.keyframe_points, "co", size=2)
 
 
 def _eases(curve) -> list[Ease]:
-    """Return the eases of an F-curve's keys as recipes name them; unknown ones become "bezier"."""
+    """Return how values go on from each key of an F-curve, in the words of recipes; unknown ones become "bezier"."""
     eases = numbers(curve.keyframe_points, "interpolation", np.int32)
     return [_EASES.get(number, "bezier") for number in eases.tolist()]
 
 
 def progress(curve, first: float, last: float, frame: float) -> float:
-    """Return the share 0 to 1 of the way from one value to another that an F-curve has gone at a frame."""
+    """Return how far an F-curve has come at a frame, 0 to 1, on the way from the value `first` to the value `last`."""
     if abs(last - first) < 1e-9:
         return 0.0
     return min(max((curve.evaluate(frame) - first) / (last - first), 0.0), 1.0)
 
 
 def set_keys(scene, path: str, index: int, keys: Sequence[tuple[float, float, Ease]], group: str = "") -> None:
-    """Replace a property's F-curve by keys: frame, value, and ease of the span that follows."""
+    """Give a property an F-curve with these keys, in place of any it has.
+
+    Args:
+        path: Data path of the property from the scene.
+        index: Component of a vector; else 0.
+        keys: For each key the timeline frame, the value, and the ease up to the next key.
+        group: Name of the channel group that animation editors show; "": none.
+    """
     pace = stretched(scene)
     keys = [(frame * pace, value, ease) for frame, value, ease in keys]
     points = new_curve(scene, path, index, group).keyframe_points
@@ -141,7 +168,7 @@ def set_keys(scene, path: str, index: int, keys: Sequence[tuple[float, float, Ea
 
 
 def new_curve(scene, path: str, index: int = 0, group: str = ""):
-    """Return a new, empty F-curve for a property, which replaces an old one."""
+    """Return a new, empty F-curve for a property. An F-curve that it had is removed."""
     bag = _channelbag(scene)
     if (old := bag.fcurves.find(path, index=index)) is not None:
         bag.fcurves.remove(old)
@@ -149,12 +176,12 @@ def new_curve(scene, path: str, index: int = 0, group: str = ""):
 
 
 def ensure_curve(scene, path: str, index: int = 0, group: str = ""):
-    """Return the F-curve of a property, made if there is none."""
+    """Return the F-curve of a property. Make an empty one if there is none."""
     return _channelbag(scene).fcurves.ensure(path, index=index, group_name=group)
 
 
 def find_curve(scene, path: str, index: int = 0):
-    """Return the F-curve of a property, muted or not, or None."""
+    """Return the F-curve of a property, muted or not; None: there is none."""
     return next((c for c in curves_under(scene, path) if (c.data_path, c.array_index) == (path, index)), None)
 
 
@@ -168,13 +195,13 @@ def _channelbag(scene):
 
 
 def remove_curves(scene, path: str) -> None:
-    """Remove the F-curves whose path starts with `path`."""
+    """Remove the scene's F-curves whose data path starts with `path`."""
     for curve in curves_under(scene, path):
         _channelbag(scene).fcurves.remove(curve)
 
 
 def move_curves(scene, path: str, frames: float) -> None:
-    """Move the keys of the F-curves whose path starts with `path` in time."""
+    """Move the keys and handles of the F-curves whose data path starts with `path` by some timeline frames."""
     frames *= stretched(scene)
     for curve in curves_under(scene, path):
         for point in curve.keyframe_points:
@@ -183,7 +210,7 @@ def move_curves(scene, path: str, frames: float) -> None:
 
 
 def copy_curves(scene, path: str, new_scene, new_path: str) -> None:
-    """Copy the F-curves whose path starts with `path` to the same properties under `new_path`."""
+    """Copy the F-curves whose data path starts with `path` to a scene, with `new_path` in place of `path`."""
     for curve in curves_under(scene, path):
         new = new_path + curve.data_path.removeprefix(path)
         copy = _channelbag(new_scene).fcurves.new_from_fcurve(curve, data_path=new)
@@ -191,7 +218,10 @@ def copy_curves(scene, path: str, new_scene, new_path: str) -> None:
 
 
 def remove_item(owner: PropertyGroup, collection: str, index: int) -> None:
-    """Remove an item of a collection in a scene's property group, with its F-curves."""
+    """Remove an item from a collection of a scene's property group, with its F-curves.
+
+    The F-curves of later items follow them to their new index.
+    """
     last = len(getattr(owner, collection)) - 1
     move_item(owner, collection, index, last)
     remove_curves(owner.id_data, f"{owner.path_from_id()}.{collection}[{last}]")
@@ -199,7 +229,7 @@ def remove_item(owner: PropertyGroup, collection: str, index: int) -> None:
 
 
 def move_item(owner: PropertyGroup, collection: str, index: int, to: int) -> None:
-    """Move an item of a collection in a scene's property group, with its F-curves."""
+    """Move an item within a collection of a scene's property group to the index `to`. F-curves follow their items."""
     items, path = getattr(owner, collection), f"{owner.path_from_id()}.{collection}"
     order = list(range(len(items)))
     order.insert(to, order.pop(index))
@@ -212,11 +242,11 @@ def move_item(owner: PropertyGroup, collection: str, index: int, to: int) -> Non
 
 
 def drives(curve) -> bool:
-    """Tell whether an F-curve drives its property."""
+    """Tell whether an F-curve determines its property's value: it is neither muted nor empty."""
     return not (curve.mute or curve.is_empty)
 
 
 def curves_under(scene, path: str) -> list:
-    """Return the scene's F-curves whose path starts with `path`."""
+    """Return the scene's F-curves whose data path starts with `path`; "" gives all."""
     bag = anim_utils.animdata_get_channelbag_for_assigned_slot(scene.animation_data)
     return [curve for curve in bag.fcurves if curve.data_path.startswith(path)] if bag else []

@@ -1,6 +1,6 @@
-"""What mattes and ramps show, as plain data (core.model.mattes.Content), and the strips that are mattes.
+"""What a matte or ramp region shows, read from Blender as plain data, and the strips that serve as mattes.
 
-Regions know a matte strip by an identity, so that it may be renamed and cut.
+A region knows its matte strip by an identity stored on both, so that the strip may be renamed and cut.
 """
 
 import uuid
@@ -31,10 +31,13 @@ _MOMENTS = 16  # steps from a filmed frame to the next
 
 
 def content(sampling: Sampling, region: PropertyGroup, moves: Moves) -> Channel:
-    """Return the channel of a matte or a ramp, where `moves` are the region's.
+    """Return what a matte or ramp region shows over time: files, a mask or a gradient.
+
+    Args:
+        moves: The region's motion, which places a gradient.
 
     Raises:
-        EffectError, MediaError: There is none.
+        EffectError, MediaError: The region has no matte, or its files cannot be found.
     """
     if region.kind == "RAMP":
         ramp = validation.word(region, "ramp")
@@ -57,17 +60,21 @@ def _source(sampling: Sampling) -> Strip:
 
 
 def tracked(sampling: Sampling) -> dict[str, Any]:
-    """Return what tracked mattes of the source are made from, and the folder that keeps them.
+    """Return what a CarriedFile (mattes tracked through footage) is made with: the footage and a folder for mattes.
 
     Raises:
-        EffectError, MediaError: There is no source.
+        EffectError, MediaError: The effect has no source strip, or its files cannot be found.
     """
     beside = Path(bpy.data.filepath).parent if bpy.data.filepath else Path(bpy.app.tempdir)  # which Blender clears
     return {"footage": source_media.spec(_source(sampling)), "folder": beside / MATTES}
 
 
 def channel(region: PropertyGroup) -> str:
-    """Return the channel that is read from a matte, as recipes name it. EffectError: it has no name."""
+    """Return which channel of a picture is the matte, as recipes name it: "luminance", "alpha" … or an EXR channel.
+
+    Raises:
+        EffectError: A named channel is wanted, and no name is given.
+    """
     word = validation.word(region, "channel")
     if word != "NAMED":
         return word.lower()
@@ -77,7 +84,11 @@ def channel(region: PropertyGroup) -> str:
 
 
 def image_path(region: PropertyGroup) -> Path:
-    """Return the file of an image matte. EffectError: it has none."""
+    """Return the absolute path of a region's matte file.
+
+    Raises:
+        EffectError: The region has no image, or the image is not a movie, image sequence or picture on disk.
+    """
     place, image = validation.place(region), region.image
     if image is None:
         raise EffectError(rpt_("{place}: it has no matte file").format(place=place))
@@ -88,10 +99,10 @@ def image_path(region: PropertyGroup) -> Path:
 
 
 def image_file(region: PropertyGroup) -> MatteFile:
-    """Return an image matte, ready to be read.
+    """Return a region's matte file with what says how it is read. Its stamp changes when the file does.
 
     Raises:
-        EffectError, MediaError: It has no file.
+        EffectError, MediaError: The region has no such file.
     """
     path = image_path(region)
     is_sequence = region.image.source == "SEQUENCE"
@@ -103,10 +114,12 @@ def image_file(region: PropertyGroup) -> MatteFile:
 
 
 def filmed_frames(sampling: Sampling) -> dict[float, int]:
-    """Return the filmed frame of the source that each timeline frame shows, from 0.
+    """Return which frame of the source's footage, from 0, is shown at each timeline frame that is sampled.
+
+    With *Smooth*, a time between two frames of the footage counts as the first of them.
 
     Raises:
-        EffectError, MediaError: It cannot be known.
+        EffectError, MediaError: The effect has no source strip, or its movie cannot be read.
     """
     source = _source(sampling)
     spec, timing = source_media.spec(source), sampling.time or source_media.timing_of(source)
@@ -118,10 +131,10 @@ def filmed_frames(sampling: Sampling) -> dict[float, int]:
 
 @lru_cache(64)
 def _movie(spec: source_media.SourceSpec) -> tuple[int, Fraction | None]:
-    """Return the length and rate of a movie; a retimed strip has another length.
+    """Return a movie's number of frames and frame rate, from the file, since a retimed strip has another length.
 
     Raises:
-        MediaError: It cannot be read.
+        MediaError: The movie cannot be read.
     """
     with spec.open() as movie:
         return movie.count, movie.fps
@@ -138,20 +151,27 @@ def _strip_frames(sampling: Sampling, region: PropertyGroup) -> Channel:
 
 
 def _of_strip(strip: Strip, word: str) -> MatteFile:
-    """Return a channel of what a movie, image or clip strip reads. MediaError: it has no files."""
+    """Return the footage of a movie, image or clip strip as a matte file.
+
+    Args:
+        word: The channel to read, as in `channel`.
+
+    Raises:
+        MediaError: The strip has no files.
+    """
     spec = source_media.spec(strip)
     return MatteFile(path=spec.path, channel=word, files=spec.files, stream=spec.options["stream"], stamp=spec.key)
 
 
 def strip_name(region: PropertyGroup) -> str:
-    """Return the name of the first strip that is a region's matte, or ""."""
+    """Return the name of the strip that is a region's matte, the first of several; "": there is none."""
     return next((strip.name for strip in _with_identity(region)), "")
 
 
 def choose_strip(region: PropertyGroup, name: str) -> None:
-    """Make the strip of a name a region's matte, with the other parts where it was cut.
+    """Make the strip with this name a region's matte, together with the parts that it was cut into.
 
-    Without such a strip, the region has none.
+    If there is no such strip, the region loses its matte strip.
     """
     editor = region.id_data.sequence_editor
     strip = editor and editor.strips_all.get(name)
@@ -169,10 +189,10 @@ def choose_strip(region: PropertyGroup, name: str) -> None:
 
 
 def strips_of(region: PropertyGroup) -> list:
-    """Return the movie, image and clip strips of a region's matte: several, where it was cut or copied.
+    """Return the movie, image and clip strips that are a region's matte: several if the strip was cut or copied.
 
     Raises:
-        EffectError: There is none.
+        EffectError: There are none.
     """
     matching = _with_identity(region)
     if not matching:
@@ -186,12 +206,12 @@ def strips_of(region: PropertyGroup) -> list:
 
 
 def parts_for(region: PropertyGroup, effect_strip: Strip) -> list:
-    """Return the parts and copies of a region's matte strip above or below the effect strip, else the nearest.
+    """Return the parts and copies of a region's matte strip that share frames with the effect strip.
 
-    The part counts that begins nearest to the effect strip, which is the first.
+    If none does, only the nearest one. They are sorted by how near they begin to the effect strip's beginning.
 
     Raises:
-        EffectError: There is none.
+        EffectError: The region has no matte strip.
     """
     parts = sorted(strips_of(region), key=lambda part: abs(part.left_handle - effect_strip.left_handle))
     beside = [part for part in parts if strips.overlap(part, effect_strip)]
@@ -199,7 +219,7 @@ def parts_for(region: PropertyGroup, effect_strip: Strip) -> list:
 
 
 def part_at(parts: list, frame: float) -> Strip:
-    """Return the first of the parts at a timeline frame, or the nearest."""
+    """Return the strip that lies at a timeline frame, the first of several; if there is none, the nearest."""
     return min(parts, key=lambda part: max(part.left_handle - frame, frame - part.right_handle + 1, 0))
 
 

@@ -1,4 +1,4 @@
-"""The extension's preferences."""
+"""The extension's preferences: render device, GPU memory, and the model that finds subjects."""
 
 from pathlib import Path
 
@@ -58,17 +58,17 @@ class ShutterPreferences(bpy.types.AddonPreferences):
 
 
 def device() -> str:
-    """Return the render device that the user wants, one of devices.available.CHOICES."""
+    """Return the render device that the user chose, one of devices.available.CHOICES; "auto" without preferences."""
     return getattr(_preferences(), "device", "").lower() or "auto"  # "" also for a device of a newer version
 
 
 def gpu_memory() -> int:
-    """Return the megabytes of the GPU that textures may take; 0: as compute.devices.device allows."""
+    """Return how many megabytes of GPU memory textures may take; 0: a share of what compute.devices.device finds."""
     return getattr(_preferences(), "gpu_memory", 0)
 
 
 def model() -> Path:
-    """Return the file of the model that finds subjects."""
+    """Return the ONNX file of the model that finds subjects: the user's, or the one that comes with the extension."""
     chosen = getattr(_preferences(), "model", "")
     return Path(bpy.path.abspath(chosen)).expanduser() if chosen else MODEL
 

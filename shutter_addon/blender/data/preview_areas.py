@@ -1,4 +1,7 @@
-"""Areas that show a preview, and how they show an effect. Only this module reads that from Blender."""
+"""The preview areas of Blender's windows: which effect they show, how large, and whether anything changes its picture.
+
+No other module reads this from Blender.
+"""
 
 import math
 from collections.abc import Iterator
@@ -20,8 +23,8 @@ class Shown(NamedTuple):
     """The effect strip that a preview shows.
 
     Attributes:
-        strips_above: Whether other strips may hide it.
-        hides_strokes: Whether a region's lines are hidden, for each region with strokes.
+        strips_above: Whether there are strips in channels above, which may hide it.
+        hides_strokes: For each region with strokes, whether its annotation layer is hidden.
     """
 
     scene: Scene
@@ -32,12 +35,12 @@ class Shown(NamedTuple):
 
 
 class Look(NamedTuple):
-    """How all previews of a scene show an effect's picture.
+    """How the previews of a scene show an effect's picture.
 
     Attributes:
-        scale: Size of a source pixel in the largest preview; None: there is no preview.
-        proxy: What Blender reads of the source for that preview; None: the footage itself.
-        is_plain: Whether they show the strip's picture unchanged, so that it may be drawn in their place.
+        scale: Preview pixels for each pixel of the source, in the largest preview, 1.0 at full size; None: no preview.
+        proxy: The proxy that Blender reads of the source for that preview; None: the footage itself.
+        is_plain: Whether all previews show the strip's picture unchanged, so that it may be drawn over them.
     """
 
     scale: float | None
@@ -46,7 +49,7 @@ class Look(NamedTuple):
 
 
 def previews(context: Context) -> Iterator[tuple[bpy.types.Window, Area]]:
-    """Yield window and area of every sequencer that shows a preview."""
+    """Yield each sequencer area that shows a preview, with its window."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "SEQUENCE_EDITOR" and area.spaces.active.view_type != "SEQUENCER":
@@ -54,13 +57,13 @@ def previews(context: Context) -> Iterator[tuple[bpy.types.Window, Area]]:
 
 
 def redraw(_owner: object = None, _context: Context | None = None) -> None:
-    """Redraw all previews. The arguments are those of an update callback."""
+    """Redraw all previews. It can be a property's update callback, and takes the arguments of one."""
     for _window, area in previews(bpy.context):
         area.tag_redraw()
 
 
 def redraw_panels() -> None:
-    """Redraw panels, but no preview."""
+    """Redraw the sequencer's sidebars, but no preview."""
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
             for region in area.regions:
@@ -69,7 +72,7 @@ def redraw_panels() -> None:
 
 
 def within(window: bpy.types.Window, area: Area) -> AbstractContextManager:
-    """Return a context in which operators work in a sequencer's preview."""
+    """Return a context manager in which Blender's operators act on the preview of a sequencer area."""
     return bpy.context.temp_override(window=window, area=area, region=preview_region(area))
 
 
@@ -79,10 +82,10 @@ def preview_region(area: Area) -> bpy.types.Region:
 
 
 def shown(context: Context, channel: int = 0) -> Shown | None:
-    """Return the effect strip under the playhead that the preview shows (selection.seen).
+    """Return the effect strip that the context's preview shows at the playhead (selection.seen), or None.
 
     Args:
-        channel: Channel that the preview has to show; 0: all.
+        channel: The value that the preview's setting *Display Channel* has to have; 0: all channels.
     """
     scene, space = selection.scene_of(context), context.space_data
     if (space.display_mode, space.display_channel) != ("IMAGE", channel) or (seen := selection.seen(scene)) is None:
@@ -96,7 +99,7 @@ def shown(context: Context, channel: int = 0) -> Shown | None:
 
 
 def look(context: Context, scene: Scene, effect: PropertyGroup, strip: Strip) -> Look:
-    """Return how previews show an effect's picture."""
+    """Return how the previews of a scene show an effect's picture: how large, from which proxy, whether unchanged."""
     areas = list(_areas_of(context, scene))
     scales = {area.spaces.active: _scale(context, scene, strip, area) for area in areas}
     scales = {space: scale for space, scale in scales.items() if math.isfinite(scale)}
@@ -109,7 +112,7 @@ def look(context: Context, scene: Scene, effect: PropertyGroup, strip: Strip) ->
 
 
 def _is_plain(scene: Scene, strip: Strip) -> bool:
-    """Tell whether the scene shows a strip's picture unchanged."""
+    """Tell whether a scene shows a strip's picture unchanged by blending, modifiers and view settings."""
     return (
         strip.blend_type in ("REPLACE", "ALPHA_OVER")
         and sole_effect.has_values(strip, _PLAIN_STRIP)
@@ -123,7 +126,7 @@ def _is_plain(scene: Scene, strip: Strip) -> bool:
 
 
 def _proxy(scene: Scene, effect: PropertyGroup, strip: Strip, space: Space) -> source_media.Proxy | None:
-    """Return what Blender reads of an effect's source in a preview; None: the footage itself."""
+    """Return the proxy that Blender reads of an effect's source for a preview; None: the footage itself."""
     source, percent = strips.nearest_source(scene, effect, strip), _PERCENT.get(space.proxy_render_size)
     if source is None or percent is None or not space.use_proxies:
         return None
@@ -131,7 +134,7 @@ def _proxy(scene: Scene, effect: PropertyGroup, strip: Strip, space: Space) -> s
 
 
 def _scale(context: Context, scene: Scene, strip: Strip, area: Area) -> float:
-    """Return the size of a source pixel in a preview: the smaller of that in Blender's picture and on the screen."""
+    """Return preview pixels per pixel of the source, by the preview's resolution or the screen's if that is lower."""
     space = area.spaces.active
     percent = _PERCENT.get(space.proxy_render_size, scene.render.resolution_percentage)
     size = strip.scene.render.resolution_x, strip.scene.render.resolution_y
@@ -145,12 +148,17 @@ def _scale(context: Context, scene: Scene, strip: Strip, area: Area) -> float:
 
 
 def _pixel(matrix: np.ndarray, size: tuple[int, int]) -> float:
-    """Return the larger side of a picture's pixel after a matrix (3, 3) from fractions of the picture."""
+    """Return the larger side of one pixel of a picture after a transform.
+
+    Args:
+        matrix: (3, 3), from fractions 0 to 1 of the picture.
+        size: The picture's width and height in pixels.
+    """
     return float(np.max(np.hypot(*matrix[:2, :2]) / size))
 
 
 def _areas_of(context: Context, scene: Scene) -> Iterator[Area]:
-    """Yield the areas in which a scene's preview is drawn."""
+    """Yield the sequencer areas in which a scene's preview is drawn."""
     for window, area in previews(context):
         shows = getattr(window.workspace, "sequencer_scene", None) or window.scene
         if shows == scene and area.spaces.active.proxy_render_size != "NONE":

@@ -1,7 +1,8 @@
-"""The effect's properties: on the scene that has its strips, because properties nested on a strip cannot be keyed.
+"""The effect's Blender properties, most of them made from the model's fields (core/model/fields.py).
 
-`scene.virtual_shutter.effects[i]` points to its effect scene. The Scene strips that show that scene are the effect's
-strips. Frames are timeline frames. Fields of the model (core/model/fields.py) become properties here.
+They lie on the scene whose sequencer has the effect's strips, because properties nested on a strip cannot be keyed.
+`scene.virtual_shutter.effects[i].scene` is the effect scene. The Scene strips that show it are the effect's strips.
+Frames are timeline frames.
 """
 
 import math
@@ -36,10 +37,11 @@ _FAR, _TURN = {"min": -MAX_DISTANCE, "max": MAX_DISTANCE}, math.radians(MAX_DEGR
 
 
 def with_fields(*kinds: type, **more: dict) -> Callable[[type], type]:
-    """Return a class decorator that adds properties for the fields of the model's classes.
+    """Return a class decorator that adds a Blender property for each field of the model's classes.
 
     Args:
-        more: By property name, further arguments of the property, such as `update`.
+        kinds: Dataclasses of the model, such as core.model.effect.Shutter.
+        more: By property name, further arguments of the property, such as {"update": …}.
     """
 
     def added(group: type) -> type:
@@ -51,7 +53,11 @@ def with_fields(*kinds: type, **more: dict) -> Callable[[type], type]:
 
 
 def _property(field: Field, **more: Any) -> object:
-    """Return a field as a property of Blender's."""
+    """Return the Blender property for a field of the model, with its label, range and default.
+
+    Args:
+        more: Further arguments of the property, such as `update`.
+    """
     kind, default = type(field.default), field.default
     said: dict = {"name": field.label, "description": field.description, "translation_context": field.context}
     if kind is str and not field.choices:
@@ -72,7 +78,11 @@ def _property(field: Field, **more: Any) -> object:
 
 
 def _region_renamed(region: PropertyGroup, new: str, old: str, is_set: bool) -> str:
-    """Return a region's name, cut as in recipes. Blender's own `maxlen` counts bytes instead of characters."""
+    """Return a region's new name, cut to MAX_NAME characters. Shutters that follow the region get the new name.
+
+    Blender calls this as the property's `set_transform`. Blender's own `maxlen` would count bytes instead of
+    characters.
+    """
     new = new[:MAX_NAME]
     if is_set:  # otherwise it has no old name
         consistency.refollow(selection.effect_of_item(region), old, new)
@@ -80,25 +90,37 @@ def _region_renamed(region: PropertyGroup, new: str, old: str, is_set: bool) -> 
 
 
 def labelled(kind: Callable, name: str, description: str, **more: Any) -> object:
-    """Return a property of a kind, which by default changes pictures."""
+    """Return a Blender property with a label and a tooltip. By default, a change has pictures made again.
+
+    Args:
+        kind: A function of bpy.props, such as FloatProperty.
+        more: Further arguments of it.
+    """
     return kind(name=name, description=description, **({"update": changed} | more))
 
 
 def choice(name: str, description: str, items: Sequence[tuple[str, str, str]], **more: Any) -> object:
-    """Return an enum property without keys, which by default changes pictures."""
+    """Return an enum property that cannot be keyed. By default, a change has pictures made again."""
     return labelled(EnumProperty, name, description, items=items, options=set(), **more)
 
 
 def setting(kind: Callable, name: str, description: str, **more: Any) -> object:
-    """Return a property without keys that changes no picture, with our own translation."""
+    """Return a property that cannot be keyed and changes no picture. Its label has a translation of this extension.
+
+    Args:
+        kind: A function of bpy.props, such as FloatProperty.
+        more: Further arguments of it.
+    """
     return kind(name=name, description=description, options=set(), translation_context=CONTEXT, **more)
 
 
 class TrackStop(PropertyGroup):
-    """The end of a track before its target.
+    """Where and why tracking a region or the camera ended early.
 
     Attributes:
-        frame: Counts from the effect's start, so that it moves with its strips.
+        frame: Counts from the effect's start, so that it moves with the effect's strips.
+        forward: Whether tracking went forward in time.
+        fault: The reason, for the user.
     """
 
     frame: FloatProperty(min=-2 * MAX_FRAME, max=2 * MAX_FRAME)
@@ -107,7 +129,12 @@ class TrackStop(PropertyGroup):
 
 
 class DrawnPlace(PropertyGroup):
-    """Where a region was when its drawing at a frame was made. `frame` is as in TrackStop."""
+    """Where a region was when it was drawn at a frame, so that moving the region later does not move that drawing.
+
+    Attributes:
+        frame: Counts from the effect's start, so that it moves with the effect's strips.
+        location: As the region's property of this name, like rotation and scale.
+    """
 
     frame: FloatProperty()
     location: FloatVectorProperty(size=2)
@@ -116,7 +143,7 @@ class DrawnPlace(PropertyGroup):
 
 
 class _Moving:
-    """Where a region or the camera is, and results and settings of tracking it."""
+    """The place of a region or the camera over time, with the settings and results of tracking it."""
 
     location: labelled(
         FloatVectorProperty, "Location", "Movement, in fractions of the picture", size=2, subtype="XYZ", **_FAR
@@ -210,7 +237,7 @@ class Shutter(PropertyGroup):
 
 @with_fields(model.Effect, Options, window={"update": _window_changed}, position={"update": _window_changed})
 class _Settings:
-    """An effect without its shutters and regions. Copies set these first, so that bars fit."""
+    """All of an effect but its shutters and regions. Copies set these first, so that bars fit the window."""
 
     name: StringProperty(name="Name", description="Name of the effect", default="Shutter")
     scene: PointerProperty(name="Scene", description="Scene that the effect's strips show", type=bpy.types.Scene)
@@ -241,9 +268,10 @@ class ShutterEffect(_Settings, PropertyGroup):
 
 
 class ShutterScene(PropertyGroup):
-    """A scene's effects, with the extension's version and the data format that saved them (data_format).
+    """A scene's effects, and the version and data format that saved them (data_format).
 
-    An effect scene has an identity, which tells copies from it.
+    Attributes:
+        identity: On an effect scene, tells it from copies of it.
     """
 
     effects: CollectionProperty(type=ShutterEffect)
@@ -253,12 +281,12 @@ class ShutterScene(PropertyGroup):
 
 
 class ShutterBake(PropertyGroup):
-    """On a baked strip and on the effect strip that it was made from; both have the same identity.
+    """What connects a baked strip with the effect strip that it was made from. Both have it, with the same identity.
 
     Attributes:
-        version: Of the effect when it was baked (effect_version).
-        first: First of `count` baked frames, from the effect strip's origin.
-        channel: Of the effect strip before it made room for the film.
+        version: effect_version.key of the effect when it was baked.
+        first: First of the `count` baked frames, counted from the effect strip's origin.
+        channel: Channel of the effect strip before it made room for the baked strip.
     """
 
     identity: StringProperty()

@@ -1,4 +1,4 @@
-"""Copy property groups as they are stored, and set values temporarily."""
+"""Copy property groups as Blender stores them, read structs as plain data, and set attributes for a while."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -11,9 +11,9 @@ POINTED = {"MovieClip": "movieclips", "Image": "images", "Mask": "masks"}
 
 
 def copy_properties(old: PropertyGroup, new: PropertyGroup) -> None:
-    """Copy all stored values to a new property group, with those of newer versions. IDs stay shared.
+    """Copy all stored values of a property group to a new one, including those that only newer versions know.
 
-    No update function runs.
+    Pointers still lead to the same data-blocks. No update callback runs.
     """
     there, copied = old.bl_system_properties_get(do_create=True), new.bl_system_properties_get(do_create=True)
     for name, value in there.items():
@@ -21,7 +21,7 @@ def copy_properties(old: PropertyGroup, new: PropertyGroup) -> None:
 
 
 def plain(struct: bpy_struct) -> dict[str, Any]:
-    """Return a struct with everything in it as plain data; pointers become session_uids."""
+    """Return all properties of a Blender struct, nested ones too, as plain data. Pointers become session_uids."""
     found: dict[str, Any] = {}
     for prop in struct.bl_rna.properties:
         name, value = prop.identifier, getattr(struct, prop.identifier)
@@ -41,7 +41,11 @@ def plain(struct: bpy_struct) -> dict[str, Any]:
 
 @contextmanager
 def for_a_while(changes: Iterable[tuple[object, str, object]]) -> Iterator[None]:
-    """Set attributes inside a `with` block. `changes` are owner, name and value of each."""
+    """Set attributes within a `with` block, and restore them afterwards.
+
+    Args:
+        changes: Owner, attribute name and new value of each.
+    """
     changes = list(changes)
     before = [(owner, name, getattr(owner, name)) for owner, name, _ in changes]
     try:

@@ -1,4 +1,4 @@
-"""Write a recipe into Blender's data: shutters, regions, strokes, keys and options."""
+"""Write a recipe into an effect's Blender data: shutters, regions, strokes, keys and options."""
 
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
@@ -26,9 +26,13 @@ _KINDS = {model.MatteRegion: "MATTE", model.OutlineRegion: "OUTLINE", model.Subj
 
 
 def apply(scene, effect, strip, source: model.Effect, folder: Path = Path()) -> None:
-    """Replace the effect's data and keys by a recipe's, whose frame 1 is the strip's first.
+    """Replace an effect's data, keys and strokes by those of a recipe.
 
     Args:
+        scene: The scene that has the effect.
+        effect: Property group of the effect.
+        strip: The effect strip; its first frame is frame 1 of the recipe.
+        source: The recipe.
         folder: Folder of the recipe, to which paths of mattes are relative.
 
     Raises:
@@ -55,7 +59,14 @@ def apply(scene, effect, strip, source: model.Effect, folder: Path = Path()) -> 
 
 
 def _set_fields(owner, path: str, part: Any, first: float, **curve) -> None:
-    """Set the fields of a part of an effect, and their keys."""
+    """Set the properties and keys of a property group from a part of a recipe.
+
+    Args:
+        path: Data path of `owner` from the scene.
+        part: An object of the model's class that has `owner`'s fields.
+        first: Timeline frame before the effect strip's first; added to the recipe's frames.
+        curve: Further arguments of fcurves.set_keys.
+    """
     for name, each in fields_of(part.__class__).items():
         value = getattr(part, name)
         if each.is_channel:
@@ -65,7 +76,13 @@ def _set_fields(owner, path: str, part: Any, first: float, **curve) -> None:
 
 
 def _set_channel(owner, path: str, name: str, source: Channel, first: float, change: Callable = float, **curve) -> None:
-    """Set a number or a vector of a property group, or its keys. `change` converts values to Blender's."""
+    """Set a number or a vector of a property group, with keys if the recipe has keys for it.
+
+    Args:
+        owner, path, first, curve: As in _set_fields.
+        name: Name of the property.
+        change: Converts a value of the recipe to Blender's, such as degrees to radians.
+    """
     if not isinstance(source, keyframes.Keys):
         setattr(owner, name, change(source.at(1)))
         return
@@ -76,16 +93,25 @@ def _set_channel(owner, path: str, name: str, source: Channel, first: float, cha
 
 
 def _set_keys(owner, path: str, index: int, keys: keyframes.Keys, values: Iterable[float], first: float, **curve):
-    """Make an F-curve with these values at the frames of keys."""
+    """Give one component of a property an F-curve with the frames and eases of `keys`, and with `values`.
+
+    Args:
+        path: Data path of the property from the scene.
+        index: Component of a vector; else 0.
+        first: Added to the frames of `keys`.
+    """
     frames = (frame + first for frame in keys.frames)
     fcurves.set_keys(owner.id_data, path, index, list(zip(frames, values, keys.eases, strict=True)), **curve)
 
 
 def matte_image(path: str | Path, channel: str = "luminance"):
-    """Return the movie, image sequence or picture at a path as an image for a region.
+    """Load a movie, image sequence or picture as the image data-block of a matte, and return that.
+
+    Args:
+        channel: The channel that the matte will use, as recipes name it.
 
     Raises:
-        MediaError: There is none, or it lacks the channel.
+        MediaError: There is no such file, or it lacks the channel.
     """
     with MatteFile(path=Path(path), channel=channel).open() as matte:
         found, count = Path(matte.path), matte.count
@@ -98,7 +124,7 @@ def matte_image(path: str | Path, channel: str = "luminance"):
 
 
 def _kept(name: str) -> str:
-    """Return a path as Blender stores it: relative to the saved file, if the preferences say so."""
+    """Return a path as Blender stores it: relative to the saved file, if the preferences say so and it can be."""
     if bpy.data.filepath and bpy.context.preferences.filepaths.use_relative_paths:
         with suppress(ValueError):  # another drive
             return bpy.path.relpath(name)
@@ -106,7 +132,7 @@ def _kept(name: str) -> str:
 
 
 def clear(scene, effect) -> None:
-    """Remove the effect's shutters, regions, scribbles and keys."""
+    """Remove an effect's shutters, regions, scribbles and keys."""
     fcurves.remove_curves(scene, effect.path_from_id() + ".")
     effect.shutters.clear()
     effect.regions.clear()
@@ -152,7 +178,7 @@ def _add_region(effect, strip, path: str, source: model.AnyRegion, shutter: mode
 
 
 def _set_file(region, strip, content: model.FileContent, image) -> None:
-    """Set a region's matte to an image."""
+    """Make a region's matte an image, with the recipe's timing and channel."""
     region.matte, region.image = "IMAGE", image
     # Blender's offset counts from the strip's untrimmed start, a recipe's from its first frame.
     region.offset = content.offset - (strips.skipped(strip) if content.timing == "timeline" else 0)
@@ -163,13 +189,23 @@ def _set_file(region, strip, content: model.FileContent, image) -> None:
 
 
 def _set_moves(moving, path: str, moves: model.Moves, first: float, **curve) -> None:
-    """Set location, rotation and scale of a region or the camera, and their keys."""
+    """Set location, rotation and scale of a region or the camera, with their keys; arguments as in _set_fields."""
     for name, change in (("location", tuple), ("rotation", np.radians), ("scale", float)):
         _set_channel(moving, path, name, getattr(moves, name), first, change, **curve)
 
 
 def _draw(effect, strip, source: model.AnyRegion, drawn: model.Drawings, color: Sequence[float], first: float) -> str:
-    """Draw a region's strokes on a new annotation layer, with a frame for each drawing. Return the layer's name."""
+    """Draw a region's strokes on a new annotation layer, at each frame that the recipe has a drawing for.
+
+    Args:
+        strip: The effect strip, whose transform places the strokes in the sequencer's image.
+        source: The region in the recipe.
+        drawn: Its strokes to draw, in fractions of the picture.
+        first: Timeline frame before the effect strip's first; added to the recipe's frames.
+
+    Returns:
+        The new layer's name.
+    """
     layer = annotation(effect).layers.new(source.name or data_("Region"), set_active=False)
     layer.color = color
     to_image = picture_to_image(strip, picture_size(effect))

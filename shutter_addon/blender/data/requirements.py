@@ -1,4 +1,4 @@
-"""What Blender's sequencer needs to ask the engine for an effect, and which data an edit's pictures use."""
+"""Which data an edit's pictures use, and which settings Blender's sequencer needs to ask our engine for an effect."""
 
 from collections.abc import Iterator
 
@@ -12,7 +12,11 @@ from .strips import ENGINE, all_strips, own_strips
 
 
 def left_out(scene: Scene) -> list[tuple[range, str]]:
-    """Return the timeline frames at which the sequencer leaves an effect out, and why."""
+    """Return where the sequencer would silently leave an effect out of the picture.
+
+    Returns:
+        For each such strip, the timeline frames at which it is shown, and the reason as a sentence for the user.
+    """
     reasons = ((shown_frames(scene, strip), why) for strip in own_strips(scene) if (why := _why(strip)) is not None)
     return [(frames, why) for frames, why in reasons if frames]
 
@@ -30,7 +34,11 @@ def _why(strip: Strip) -> str | None:
 
 
 def settings(strip: Strip) -> Iterator[tuple[bpy_struct, str, object]]:
-    """Yield owner, name and value of the settings that a strip's picture needs, besides a camera."""
+    """Yield the settings, besides a camera, without which Blender does not render an effect strip's picture.
+
+    Yields:
+        The struct that has the setting, the setting's name, and the value that it needs.
+    """
     scene = strip.scene
     yield strip, "scene_input", "CAMERA"
     yield scene.render, "engine", ENGINE
@@ -44,16 +52,20 @@ def settings(strip: Strip) -> Iterator[tuple[bpy_struct, str, object]]:
 
 
 def camera(strip: Strip) -> Object | None:
-    """Return the camera that shows the strip's scene, or None."""
+    """Return the camera of an effect strip's scene, without which Blender renders it empty; None: there is none."""
     bound = (marker.camera for marker in strip.scene.timeline_markers if marker.camera)
     return strip.scene_camera or strip.scene.camera or next(bound, None)
 
 
 def shown_scenes(film: Scene, frames: range | None = None) -> dict[Scene, range]:
-    """Return what a film shows at some frames: itself, and every scene in its Scene strips at all frames.
+    """Return the scenes whose edits a film shows: its own scene, and those in its Scene strips, nested ones too.
 
     Args:
-        frames: None: at any, even where strips are muted now.
+        film: The scene that is rendered.
+        frames: Timeline frames of it; None: any frame, and muted strips count as well.
+
+    Returns:
+        For each scene, the frames of it that can be visible: `frames` for the film, all for the others.
     """
     ever = range(-MAX_FRAME, MAX_FRAME + 1)
     shown = {film: ever if frames is None else frames}
@@ -69,12 +81,12 @@ def shown_scenes(film: Scene, frames: range | None = None) -> dict[Scene, range]
 
 
 def is_shown(scene: Scene, strip: Strip, frames: range) -> bool:
-    """Tell whether a strip is shown at one of these timeline frames."""
+    """Tell whether a strip is shown at one of these timeline frames (shown_frames)."""
     return bool(frame_ranges.common(shown_frames(scene, strip), frames))
 
 
 def shown_frames(scene: Scene, strip: Strip) -> range:
-    """Return the timeline frames at which a strip is shown: not muted, nor in a meta strip that is."""
+    """Return the timeline frames at which a strip and the meta strips around it lie and are not muted."""
     first, last = strip.left_handle, strip.right_handle
     while strip is not None:
         outer = strip.parent_meta()
@@ -86,9 +98,10 @@ def shown_frames(scene: Scene, strip: Strip) -> range:
 
 
 def used_data(scene: Scene, frames: range) -> set[ID]:
-    """Return the data-blocks that pictures at these frames use: scenes, and what their shown strips use in turn.
+    """Return the data-blocks that pictures at these timeline frames use: images, clips, fonts, scenes and so on.
 
-    What scenes hold beside their strips is in no picture.
+    These are what the shown strips use, directly or through other data. What scenes hold beside their strips is in no
+    picture.
     """
     shown = shown_scenes(scene, frames)
     uses: dict = {}

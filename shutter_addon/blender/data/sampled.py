@@ -1,6 +1,7 @@
-"""Sample an effect's properties and F-curves at timeline frames, as channels of plain data.
+"""Sample an effect's properties and F-curves at timeline frames, as plain data that does not need Blender any more.
 
-Only on Blender's main thread.
+A property becomes a channel: an object whose `at(frame)` gives the property's value at a sampled frame. To be called on
+Blender's main thread only.
 """
 
 from collections.abc import Callable, Collection
@@ -24,9 +25,9 @@ Frames = Collection[float]  # of the timeline
 
 
 def tried(function: Callable, *arguments: object) -> Any:
-    """Return a function's result, or the UserError that it raises.
+    """Return what a function returns, or the UserError that it raises, as an object.
 
-    Channels raise such an error when the value is asked for.
+    A channel stores such an error among its values, and raises it when that value is asked for.
     """
     try:
         return function(*arguments)
@@ -35,10 +36,11 @@ def tried(function: Callable, *arguments: object) -> Any:
 
 
 def value(owner: PropertyGroup, field: Field, number: float | None = None) -> Any:
-    """Return the model's value of a field that has no channel.
+    """Return the value of a property as the model has it: words in place of enum items, for example.
 
     Args:
-        number: Value of the property's F-curve.
+        field: The model's field for the property, of a kind whose value is no channel.
+        number: What the property's F-curve says, in place of the property's own value.
 
     Raises:
         EffectError: The value is none of its choices, or out of range.
@@ -55,17 +57,19 @@ def value(owner: PropertyGroup, field: Field, number: float | None = None) -> An
 
 
 def placement_now(moving: PropertyGroup) -> Placement:
-    """Return where the properties of a region or the camera place it, whether they are keyed or not."""
+    """Return where a region or the camera is by the current values of its properties, whether they are keyed or not."""
     return Placement(tuple(moving.location), float(np.degrees(moving.rotation)), moving.scale)
 
 
 @dataclass(frozen=True)
 class Sampling:
-    """Samples an effect's channels.
+    """Reads an effect's properties as channels: constants, or values at some timeline frames where they have F-curves.
 
     Attributes:
-        strip: The effect strip. None: nothing depends on where it lies.
-        frames: Timeline frames at which channels are sampled.
+        curves: The F-curves of the scene that has the effect.
+        effect: The effect's property group.
+        strip: The effect strip; None: nothing that is read depends on where it lies.
+        frames: Timeline frames at which properties with F-curves are sampled.
     """
 
     curves: Curves
@@ -79,31 +83,43 @@ class Sampling:
 
     @cached_property
     def path(self) -> str:
-        """The effect's path from its scene."""
+        """The effect's data path from its scene."""
         return self.effect.path_from_id()
 
     def over(self, keyed: object, at: Callable[[float], object], keys: tuple = ()) -> Channel:
-        """Return a channel of a function's values: sampled where it is keyed, else constant.
+        """Return `at(frame)` as a channel (values over time): sampled at all frames if it is keyed, else constant.
+
+        A UserError at one frame is kept, and raised when that frame's value is asked for.
 
         Args:
-            keyed: F-curves that the function evaluates, or anything true where it depends on the frame.
-            keys: As of keyframes.Samples.
+            keyed: The F-curves that `at` evaluates, or any true value if it depends on the frame.
+            at: Takes a timeline frame.
+            keys: Frames and eases of the F-curves' keys, as in keyframes.Samples.
         """
         if not keyed:
             return keyframes.Constant(tried(at, 0.0))
         return keyframes.Samples({frame: tried(at, frame) for frame in self.frames}, keys)
 
     def channel(self, owner: PropertyGroup, path: str, name: str, change: Callable = lambda value: value) -> Channel:
-        """Return the channel of a float property or vector, with a function applied to each value."""
+        """Return the values over time (a channel) of a float property or vector.
+
+        Args:
+            owner: The struct that has the property.
+            path: Data path of `owner` from the scene.
+            name: Name of the property.
+            change: Applied to each value, such as from radians to degrees.
+        """
         curves, keyed = self.curves, self.curves.of(owner, path, name)
         return self.over(keyed, lambda frame: change(curves.value(owner, path, name, frame)), curves.keys(keyed))
 
     def fields(self, owner: PropertyGroup, path: str, kind: type, unused: Collection[str] = ()) -> dict:
-        """Return values and channels for the fields of a model's class, by field name.
+        """Return arguments for a class of the model, read from a property group: values and channels by field name.
 
         Args:
-            path: The owner's path from the scene.
-            unused: Fields without effect, which keep their defaults.
+            owner: The property group.
+            path: Data path of `owner` from the scene.
+            kind: The class, such as model.Shutter.
+            unused: Fields that have no effect now and are left out, so that they keep their defaults.
 
         Raises:
             EffectError: A choice is none of its items, or a number without keys is out of range.
@@ -115,7 +131,11 @@ class Sampling:
         }
 
     def moves(self, moving: PropertyGroup, path: str) -> model.Moves:
-        """Return the motion of a region or the camera."""
+        """Return the motion of a region or the camera: location, rotation in degrees, and scale over time.
+
+        Args:
+            path: Data path of `moving` from the scene.
+        """
         return model.Moves(
             location=self.channel(moving, path, "location"),
             rotation=self.channel(moving, path, "rotation", np.degrees),
@@ -124,7 +144,10 @@ class Sampling:
 
     @cached_property
     def placement(self) -> Channel:
-        """The matrix from the sequencer's image to the strip's picture, which may be keyed."""
+        """Over time, the matrix (3, 3) from the sequencer's image space to fractions of the effect strip's picture.
+
+        Its value is None where the strip is too small to be seen. Without a strip it is None at all frames.
+        """
         strip = self.strip
         if strip is None:
             return keyframes.Constant(None)
@@ -139,7 +162,10 @@ class Sampling:
 
     @cached_property
     def time(self) -> Channel | None:
-        """The source time that the effect sets; None: the strip's own timing counts."""
+        """Over time, the source frame that *Custom Time* shows, and whether it runs backward; None: it is off.
+
+        For shutters whose length is *Timeline*, it is sampled half a frame before and after each frame as well.
+        """
         effect = self.effect
         if not effect.use_source_time:
             return None
@@ -153,11 +179,14 @@ class Sampling:
         return sampling.over(keyed, keyframes.SourceTime(numbers, keys).at, keys)
 
     def drawings(self, index: int, every: bool = False, layer_name: str = "layer") -> model.Drawings:
-        """Return a region's drawings, eased by the keys of its location.
+        """Return a region's strokes over time: those drawn at some frames, and how they go on to the next drawing.
+
+        The keys of the region's location say how: their ease counts from each drawing to the next.
 
         Args:
-            every: Read the strokes of all drawings, not only of those that the frames need.
-            layer_name: One of annotations.LAYERS.
+            index: Of the region.
+            every: Read the strokes of all drawings, not only of those that the sampled frames need.
+            layer_name: Which of the region's annotation layers, one of annotations.LAYERS.
         """
         region, path = self.effect.regions[index], f"{self.path}.regions[{index}]"
         width, height = annotations.picture_size(self.effect)
@@ -179,7 +208,12 @@ class Sampling:
         )
 
     def _origins(self, region: PropertyGroup, path: str, numbers: tuple[int, ...]) -> tuple[Placement, ...]:
-        """Return where a region was when its drawings at these frames were made, as model.Drawings has it."""
+        """Return where the region was when its drawing at each of these frames was made; (): drawings do not note it.
+
+        Args:
+            path: Data path of the region from the scene.
+            numbers: Timeline frames of the drawings.
+        """
         if not region.drawn or region.kind in strips.LAID:
             return ()
         known = {np.rint(self.effect.start + noted.frame): placement_now(noted) for noted in region.drawn}

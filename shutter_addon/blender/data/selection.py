@@ -1,4 +1,4 @@
-"""What is seen and what is active: scene, strip, effect, shutter and region."""
+"""What the user sees and works on: the active strip, effect, shutter and region, and the effect in the preview."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -13,14 +13,14 @@ from .strips import SOURCES, effect_of, effect_strips
 
 
 def scene_of(context: Context) -> Any:
-    """Return the scene whose sequencer the context shows, or None."""
+    """Return the scene whose sequencer a context shows; None: there is none."""
     return getattr(context, "sequencer_scene", None) or context.scene
 
 
 def active_strip(context: Context) -> Any:
-    """Return the active strip of the context's scene, or None. A movie counts in place of its sound.
+    """Return the active strip of the context's scene; None: there is none.
 
-    Blender makes the sound active when it adds both.
+    If it is a movie's sound, return the movie, because Blender makes the sound active when it adds both.
     """
     scene = scene_of(context)
     strip = scene.sequence_editor.active_strip if scene and scene.sequence_editor else None
@@ -30,9 +30,10 @@ def active_strip(context: Context) -> Any:
 
 
 def active(context: Context) -> Any:
-    """Return scene, effect and effect strip that the interface shows and changes, or None.
+    """Return (scene, effect, effect strip) that panels show and operators change; None: there is none.
 
-    They belong to the active strip, or to the source that it is, if it is selected. Otherwise they are those seen.
+    It is the effect of the active strip: an effect strip, a baked strip or a source. If that strip is not selected, the
+    effect in the preview (`seen`) comes first. Without an active strip, only the preview counts.
     """
     scene, strip = scene_of(context), active_strip(context)
     if strip is not None and (baked := _baked_part(scene, strip)) is not None:
@@ -49,15 +50,15 @@ def active(context: Context) -> Any:
 
 
 def in_picture(context: Context) -> Any:
-    """Return what is active, if it is also seen, else None."""
+    """Return what `active` returns, but only if the preview shows that effect strip at the playhead, else None."""
     shown = active(context)
     return shown if shown and seen(shown[0]) == shown else None
 
 
 def seen(scene: Scene) -> Any:
-    """Return scene, effect and effect strip that previews of a scene show at the playhead, or None.
+    """Return (scene, effect, effect strip) that previews of a scene show at the playhead; None: no effect is there.
 
-    Of several, the active strip's own counts, then one of the active strip's source, then the highest.
+    Of several, the active strip counts first, then one whose source is the active strip, then the highest channel.
     """
     scene_strips = [strip for strip in visible(scene) if strip.type == "SCENE" and strip.scene]
     shown = [(strip, effect) for strip in scene_strips if (effect := effect_of(scene, strip.scene))]
@@ -70,7 +71,10 @@ def seen(scene: Scene) -> Any:
 
 
 def visible(scene: Scene) -> list:
-    """Return the strips with a picture under the playhead, of the scene or of the open meta strip."""
+    """Return the strips at the playhead that have a picture and are not muted.
+
+    Inside an open meta strip, only its strips count.
+    """
     editor, frame = scene and scene.sequence_editor, scene and scene.frame_current
     if not editor:
         return []
@@ -80,7 +84,7 @@ def visible(scene: Scene) -> list:
 
 
 def why_unseen(scene: Scene, strip: Strip) -> str:
-    """Return a sentence: why an effect strip is not in the picture, and what to do."""
+    """Return a sentence for the user: why an effect strip is not in the preview's picture, and what to do about it."""
     if not strips.is_at(strip, scene.frame_current):
         return rpt_("Move the playhead onto the Shutter strip")
     if strip.mute and strip.virtual_shutter_bake.identity:
@@ -91,7 +95,7 @@ def why_unseen(scene: Scene, strip: Strip) -> str:
 
 
 def _effects_of(scene: Scene, strip: Strip | None) -> list:
-    """Return the effect that a strip shows, or those of which it is the source."""
+    """Return the effect that an effect strip shows, in a list, or all effects that have the strip as their source."""
     if strip is None:
         return []
     if strip.type == "SCENE" and (own := effect_of(scene, strip.scene)):
@@ -101,9 +105,9 @@ def _effects_of(scene: Scene, strip: Strip | None) -> list:
 
 
 def _baked_part(scene: Scene, strip: Strip) -> Any:
-    """Return scene, effect and effect strip that a baked strip was made from, or None.
+    """Return (scene, effect, effect strip) for a baked strip or an effect strip that was baked; None: it is neither.
 
-    Copies have the same identity; the one that shares frames with the strip counts.
+    Copies of a bake share its identity; of several effect strips, one that overlaps the strip in time counts.
     """
     parts = [part for part in of_bake(scene, strip) if part.type == "SCENE" and part.scene]
     parts.sort(key=lambda part: (part != strip, not strips.overlap(part, strip)))
@@ -112,43 +116,46 @@ def _baked_part(scene: Scene, strip: Strip) -> Any:
 
 
 def of_bake(scene: Scene, strip: Strip) -> list:
-    """Return all strips of the same bake as a strip, with itself."""
+    """Return all strips that belong to the same bake as a strip, itself included: effect strips and baked strips."""
     identity = strip.virtual_shutter_bake.identity
     found = scene.sequence_editor.strips_all if identity else ()
     return [other for other in found if other.virtual_shutter_bake.identity == identity]
 
 
 def choose(scene: Scene, strip: Strip) -> None:
-    """Make a strip the active and only selected one."""
+    """Make a strip the active one, and select it alone."""
     for other in scene.sequence_editor.strips_all:
         other.select = other == strip
     scene.sequence_editor.active_strip = strip
 
 
 def effect_of_item(item: PropertyGroup) -> PropertyGroup:
-    """Return the effect of a shutter or a region."""
+    """Return the effect that a shutter or a region belongs to."""
     path = item.path_from_id()
     return item.id_data.path_resolve(path[: path.index("]") + 1])
 
 
 def moving(effect: PropertyGroup, index: int | None) -> PropertyGroup:
-    """Return the region of an index, or the camera for None. Functions for both take such an index."""
+    """Return the region with this index, or the effect's camera for None. Both have the same properties of motion.
+
+    Functions that work on either take such an index.
+    """
     return effect.camera if index is None else effect.regions[index]
 
 
 def active_shutter(effect: PropertyGroup) -> Any:
-    """Return the active shutter in the list, or None."""
+    """Return the shutter that is active in the list of shutters; None: there is none."""
     return effect.shutters[effect.active_shutter] if 0 <= effect.active_shutter < len(effect.shutters) else None
 
 
 def own_regions(effect: PropertyGroup) -> list[int]:
-    """Return the indices of the active shutter's regions, which the list shows."""
+    """Return the indices of the regions that use the active shutter. The list of regions shows only these."""
     shutter = active_shutter(effect)
     return [i for i, region in enumerate(effect.regions) if shutter and region.shutter == shutter.name]
 
 
 def active_region(effect: PropertyGroup) -> Any:
-    """Return the active region in the list, if it belongs to the active shutter, or None."""
+    """Return the region that is active in the list of regions; None: there is none, or it uses another shutter."""
     region = effect.regions[effect.active_region] if 0 <= effect.active_region < len(effect.regions) else None
     shutter = active_shutter(effect)
     return region if region and shutter and region.shutter == shutter.name else None
@@ -156,12 +163,14 @@ def active_region(effect: PropertyGroup) -> Any:
 
 @dataclass(frozen=True)
 class Target:
-    """What is worked on. It is looked up before each step, because Blender's data may have changed.
+    """A region or the camera that work over several steps is done on, such as tracking, found again before each step.
+
+    A reference would not do, because Blender's data may be moved or removed meanwhile.
 
     Attributes:
         scene: session_uid of the effect scene.
-        index: see selection.moving.
-        known: differs if another region has taken its place.
+        index: Of the region; None: the camera.
+        known: What is compared to notice that another region has taken this index.
     """
 
     scene: int
@@ -173,7 +182,11 @@ class Target:
         return cls(effect.scene.session_uid, index, cls._known(effect, index))
 
     def effect(self) -> PropertyGroup | None:
-        """Return the effect; None: it is gone, moved, or undone, or another region has this index."""
+        """Return the effect.
+
+        Returns:
+            None if it is gone or was moved in time, if undo replaced it, or if another region has the index now.
+        """
         effects = (effect for scene in bpy.data.scenes for effect in scene.virtual_shutter.effects if effect.scene)
         effect = next((effect for effect in effects if effect.scene.session_uid == self.scene), None)
         is_there = effect is not None and (self.index is None or self.index < len(effect.regions))

@@ -1,8 +1,8 @@
-"""Read an effect strip as plain data, and as a recipe: the only place that reads effects from Blender's data.
+"""Read an effect strip from Blender's data: as a snapshot, which is plain data, or as a recipe.
 
-Only on Blender's main thread. A snapshot holds no Blender data, so threads may read it, and it does not change with the
-scene. Blender itself evaluates F-curves, at the frames that are asked for. Drivers, NLA strips and further layers of an
-action do not count (docs/manual.md).
+To be called on Blender's main thread only. A snapshot holds no Blender data, so other threads may use it, and it does
+not change with the scene. Blender evaluates the F-curves, at the frames that are asked for. Drivers, NLA strips and
+further layers of an action do not count (docs/manual.md).
 """
 
 from collections.abc import Sequence
@@ -31,18 +31,19 @@ from .sampled import Frames, Sampling
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """Everything that the pictures of an effect strip depend on. Frames are timeline frames.
+    """All that the pictures of an effect strip depend on, at some timeline frames, without Blender's data.
 
     Attributes:
-        scene: session_uid of the effect's scene.
-        origin: Timeline frame that shows frame 0 of the effect's scene.
+        scene: session_uid of the effect scene.
+        origin: Timeline frame at which the effect scene's frame 0 would be shown.
         first: First timeline frame of the strip.
-        film: Frame step and last frame of the scene that is rendered.
-        frames: Timeline frames at which channels are sampled.
-        source: What is read.
-        timing: When it is read; None: the effect has a Custom Time.
-        blended: Color space in which the sequencer lays the strip over others; "": it does not.
-        folder: Folder of the .blend file; None: it was not saved.
+        film: Frame step and last frame of the scene whose sequencer is rendered.
+        frames: Timeline frames at which keyed properties were sampled.
+        effect: Shutters, regions and options.
+        source: The footage, and how it is read.
+        timing: Which frame of the footage is shown when; None: the effect's *Custom Time* says so.
+        blended: Color space in which the sequencer blends the strip with those below; "": it does not blend it.
+        folder: Folder of the .blend file; None: it was never saved.
     """
 
     scene: int
@@ -57,15 +58,19 @@ class Snapshot:
     folder: Path | None = None
 
     def timeline_frame(self, scene_frame: float) -> float:
-        """Return the timeline frame that shows a frame of the effect's scene."""
+        """Return the timeline frame at which a frame of the effect scene is shown."""
         return self.origin + scene_frame
 
 
 def take(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames) -> Snapshot:
-    """Take the snapshot of an effect strip at timeline frames.
+    """Return the snapshot of an effect strip.
+
+    Args:
+        scene: The scene that has the strip.
+        frames: Timeline frames that pictures will be made at.
 
     Raises:
-        EffectError, MediaError: There is no source, or no picture at any frame.
+        EffectError, MediaError: There is no source, or the effect cannot be shown at any frame.
     """
     source = strips.source_of(scene, effect, strip)
     return Snapshot(
@@ -83,9 +88,9 @@ def take(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames) -> S
 
 
 def read(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames) -> model.Effect:
-    """Read an effect, with its channels sampled at timeline frames.
+    """Return an effect as the model has it, with keyed properties sampled at timeline frames.
 
-    What is wrong at one frame is raised when that frame is asked for.
+    What is wrong at one frame only is raised when that frame's values are asked for.
 
     Raises:
         EffectError, MediaError: It has no shutter, too many shutters or regions, or a matte without content.
@@ -117,7 +122,10 @@ def read(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames) -> m
 
 
 def _around(effect: PropertyGroup, frames: Frames, has_layers: bool) -> Frames:
-    """Return the frames at which motions are needed: with those around where a shutter follows or a layer fills in."""
+    """Return the timeline frames at which motions are sampled: `frames`, and as many around each as are needed.
+
+    They are needed where an exposure follows a motion, or other frames fill what layers cover.
+    """
     if has_layers or any(shutter.follow != "NOTHING" for shutter in effect.shutters):
         smooth = max(validation.number(shutter, "follow_smooth") for shutter in effect.shutters)
         reach = state_at.reach(validation.number(effect, "window")) + smooth
@@ -131,7 +139,11 @@ def _around(effect: PropertyGroup, frames: Frames, has_layers: bool) -> Frames:
 
 
 def _followed(shutter: PropertyGroup, regions: Sequence[model.AnyRegion], camera: model.Camera) -> model.Subject | None:
-    """Return what a shutter follows. EffectError: there is no such region."""
+    """Return what a shutter's exposure moves with: a region, the camera, or None.
+
+    Raises:
+        EffectError: It is to follow a region that does not exist.
+    """
     follow = validation.word(shutter, "follow")
     if follow == "NOTHING":
         return None
@@ -145,7 +157,10 @@ def _followed(shutter: PropertyGroup, regions: Sequence[model.AnyRegion], camera
 
 
 def bars_at(scene: Scene, effect: PropertyGroup, index: int, frame: float) -> np.ndarray:
-    """Return the bars (L,) of a shutter at a timeline frame.
+    """Return a shutter's bars (how much each frame counts, (L,)) at a timeline frame, interpolated between keys.
+
+    Args:
+        index: Of the shutter.
 
     Raises:
         EffectError: A bar is out of range, or they are not as many as the window is long.
@@ -156,10 +171,15 @@ def bars_at(scene: Scene, effect: PropertyGroup, index: int, frame: float) -> np
 
 
 def strokes_at(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, frame: float) -> list[np.ndarray]:
-    """Return a region's strokes (n, 2) on the picture before it moves; a matte has none.
+    """Return a region's strokes (n, 2) at a timeline frame, in fractions of the picture, before the region's motion.
+
+    A matte or ramp has none.
+
+    Args:
+        index: Of the region.
 
     Raises:
-        EffectError: They are nowhere near the picture.
+        EffectError: They lie far outside the picture.
     """
     if effect.regions[index].kind in strips.MATTES:
         return []
@@ -168,10 +188,16 @@ def strokes_at(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, fr
 
 
 def region_at(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, frames: Frames) -> Any:
-    """Return a region as plain data, sampled at timeline frames: a Region or a MatteRegion.
+    """Return a region as plain data, sampled at timeline frames, for tracking and drawing.
 
-    An outline becomes the Region of its curves as a lasso, a subject that of its strokes as lines. What is wrong at
-    one frame is raised when that frame is asked for.
+    An outline is given as a lasso region of its curves, a subject as a line region of its strokes. What is wrong at one
+    frame only is raised when that frame's values are asked for.
+
+    Args:
+        index: Of the region.
+
+    Returns:
+        A Region, or for a matte or ramp a MatteRegion.
     """
     read_region = _region if effect.regions[index].kind in strips.OUTLINED else _any_region
     return read_region(Sampling.of(scene, effect, strip, frames), index, 0)
@@ -180,10 +206,17 @@ def region_at(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, fra
 def carried_outline(
     scene: Scene, effect: PropertyGroup, strip: Strip, index: int, frames: Frames
 ) -> tuple[Any, dict[float, int]]:
-    """Return the file of a tracked outline's or a subject's mattes, and the filmed frames that timeline frames show.
+    """Return what is needed to read the mattes of a subject, or of an outline that is tracked between drawings.
+
+    Args:
+        index: Of the region.
+        frames: Timeline frames.
+
+    Returns:
+        The CarriedFile that makes the mattes, and the frame of the footage, from 0, that each timeline frame shows.
 
     Raises:
-        EffectError, MediaError: The outline is linear, or has no source.
+        EffectError, MediaError: The outline is interpolated instead of tracked, or has no source.
     """
     sampling = Sampling.of(scene, effect, strip, frames)
     _curves, file = _drawn(sampling, index)
@@ -194,21 +227,25 @@ def carried_outline(
 
 
 def source_frames(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames) -> dict[float, int]:
-    """Return the filmed frame of the source that each timeline frame shows.
+    """Return which frame of the source's footage, from 0, each of these timeline frames shows.
 
     Raises:
-        EffectError, MediaError: It cannot be known.
+        EffectError, MediaError: The effect has no source strip, or its movie cannot be read.
     """
     return matte_content.filmed_frames(Sampling.of(scene, effect, strip, frames))
 
 
 def camera_at(scene: Scene, effect: PropertyGroup, frames: Frames) -> model.Camera:
-    """Return the camera as plain data, sampled as in region_at."""
+    """Return the effect's camera motion as plain data, sampled at timeline frames."""
     return _camera(Sampling.of(scene, effect, None, frames))
 
 
 def check_counts(effect: PropertyGroup) -> None:
-    """Raise EffectError where an effect has no shutter, or too many shutters or regions."""
+    """Check that an effect has a shutter, and not too many shutters or regions.
+
+    Raises:
+        EffectError: It has none, or too many.
+    """
     if not effect.shutters:
         raise EffectError(rpt_('"{effect}" has no shutter').format(effect=effect.name))
     if full := validation.why_full(effect):
@@ -216,7 +253,7 @@ def check_counts(effect: PropertyGroup) -> None:
 
 
 def _options(sampling: Sampling) -> keyframes.Channel:
-    """Return the channel of an effect's options; it raises EffectError for an option out of range."""
+    """Return an effect's options over time. Asked for a frame at which one is out of range, they raise EffectError."""
     fields = fields_of(Options).items()
     found = {name: sampling.curves.find(f"{sampling.path}.{name}") for name, field in fields if field.keyed}
     keyed = {name: curve for name, curve in found.items() if curve}
@@ -229,7 +266,12 @@ def _options(sampling: Sampling) -> keyframes.Channel:
 
 
 def _shutter(sampling: Sampling, index: int, options: keyframes.Channel) -> model.Shutter:
-    """Return a shutter, except for what it follows."""
+    """Return a shutter as the model has it, except for what its exposure follows.
+
+    Args:
+        index: Of the shutter.
+        options: The effect's options over time, which give the window's length.
+    """
     path, shutter = f"{sampling.path}.shutters[{index}]", sampling.effect.shutters[index]
     bars = sampled.tried(_bars, sampling, path, shutter, options)
     if isinstance(bars, EffectError):
@@ -241,7 +283,15 @@ def _shutter(sampling: Sampling, index: int, options: keyframes.Channel) -> mode
 
 
 def _bars(sampling: Sampling, path: str, shutter: PropertyGroup, options: keyframes.Channel) -> keyframes.Bars:
-    """Return a shutter's bars. EffectError: they are not as many as the window is long."""
+    """Return a shutter's bars (how much each frame counts) over time.
+
+    Args:
+        path: Data path of the shutter from the scene.
+        options: The effect's options over time, which give the window's length.
+
+    Raises:
+        EffectError: The bars are not as many as the window is long.
+    """
     curves, frames, stored = sampling.curves, sampling.frames, [bar.weight for bar in shutter.bars]
     keyed = {i: curve for i in range(len(stored)) if (curve := curves.find(f"{path}.bars[{i}].weight"))}
     chosen = (sampled.tried(options.at, frame) for frame in frames)
@@ -261,7 +311,11 @@ def _bars(sampling: Sampling, path: str, shutter: PropertyGroup, options: keyfra
 
 
 def _bars_over(shutter: PropertyGroup, keyed: dict[int, FCurve], frames: Frames) -> dict[float, np.ndarray | UserError]:
-    """Return the bars (L,) at each frame. `keyed` has the F-curves by index of the bar."""
+    """Return a shutter's bars (L,), how much each frame counts, by timeline frame; an error where one is out of range.
+
+    Args:
+        keyed: F-curves by the index of their bar.
+    """
     rows = np.tile(np.array([bar.weight for bar in shutter.bars]), (len(frames), 1))
     for i, curve in keyed.items():
         # A curve may go below 0, a bar may not. NaN stays NaN, and is refused below.
@@ -274,9 +328,13 @@ def _bars_over(shutter: PropertyGroup, keyed: dict[int, FCurve], frames: Frames)
 
 
 def _ways(curves: list, keys: list[float], frames: Frames) -> dict[float, tuple[tuple[float, float], float]]:
-    """Return, for each frame, the keys before and after it and the share of the way between them.
+    """Return, for each frame, the two keys around it, and the share 0 to 1 of the way between them.
 
-    The curve that changes most between the two keys gives the share.
+    The curve whose value changes most between the two keys gives the share.
+
+    Args:
+        curves: F-curves of a shutter's bars.
+        keys: Timeline frames of all their keys, ascending.
     """
     ways, leaders = {}, {}
     for frame in frames:
@@ -290,7 +348,11 @@ def _ways(curves: list, keys: list[float], frames: Frames) -> dict[float, tuple[
 
 
 def _any_region(sampling: Sampling, index: int, shutter: int) -> model.Region | model.MatteRegion:
-    """Return a region of any kind. `shutter` is the index of its shutter.
+    """Return a region of any kind as the model has it.
+
+    Args:
+        index: Of the region.
+        shutter: Index of its shutter.
 
     Raises:
         EffectError, MediaError: A matte has no content.
@@ -311,9 +373,13 @@ def _any_region(sampling: Sampling, index: int, shutter: int) -> model.Region | 
 
 
 def _drawn(sampling: Sampling, index: int) -> tuple[dict[str, Any], Any]:
-    """Return what is drawn in an outline or a subject, by the model's names, and the file of its tracked mattes.
+    """Return what is drawn in an outline or a subject, and the CarriedFile that makes its mattes by tracking.
 
-    The mattes of a linear outline are not tracked, so that it has no file.
+    Args:
+        index: Of the region.
+
+    Returns:
+        Drawings by the names of the model's fields. None in place of the file for an outline that is not tracked.
 
     Raises:
         EffectError, MediaError: There is no source.
@@ -333,7 +399,11 @@ def _drawn(sampling: Sampling, index: int) -> tuple[dict[str, Any], Any]:
 
 
 def _by_source_frame(sampling: Sampling, drawings: model.Drawings) -> dict[int, outlines.Curves]:
-    """Return the curves of drawings by filmed frame of the source. EffectError, MediaError: there is no source."""
+    """Return the curves of drawings, in fractions of the picture, by the frame of the footage that they were drawn on.
+
+    Raises:
+        EffectError, MediaError: There is no source.
+    """
     there = replace(sampling, frames=drawings.frames)
     placed = replace(drawings, placement=there.placement)
     filmed = matte_content.filmed_frames(there).items()
@@ -361,15 +431,15 @@ def _camera(sampling: Sampling) -> model.Camera:
 
 
 def recipe_of(scene: Scene, effect: PropertyGroup, strip: Strip, contents: Sequence = ()) -> model.Effect:
-    """Return the effect as a recipe, whose frame 1 is the strip's first.
+    """Return an effect as a recipe, whose frame 1 is the strip's first.
 
     Regions without a shutter are left out, and what key_fitting.with_keys leaves out.
 
     Args:
-        contents: As in key_fitting.with_keys.
+        contents: The recipe's contents of matte regions, in order, as in key_fitting.with_keys.
 
     Raises:
-        EffectError: The effect cannot be rendered as it stands.
+        EffectError: The effect cannot be rendered as it is.
     """
     check_counts(effect)
     shown, keyed = range(strip.left_handle, strip.right_handle), _keyed(scene, effect)
@@ -384,7 +454,7 @@ def recipe_of(scene: Scene, effect: PropertyGroup, strip: Strip, contents: Seque
 
 
 def _keyed(scene: Scene, effect: PropertyGroup) -> set[float]:
-    """Return the timeline frames of the effect's keys and drawings."""
+    """Return the timeline frames at which an effect has keys or drawings."""
     curves, pace = curves_under(scene, effect.path_from_id() + "."), stretched(scene)
     frames = {frame for curve in curves for frame in (points_of(curve)[:, 0] / pace).tolist()}
     layers = (layer for region in effect.regions for layer in layers_of(effect, region))

@@ -1,4 +1,7 @@
-"""Whether a film shows nothing but an effect's picture, unchanged, and whether its 8-bit levels can be predicted."""
+"""Whether a film shows nothing but an effect's picture, unchanged, and whether its 8-bit levels can be predicted.
+
+If so, a film can be rendered without Blender's engine, with the same bits (output/edit_feed.py).
+"""
 
 from collections.abc import Mapping
 
@@ -25,12 +28,15 @@ _LEVELS = {"color_depth": "8", "color_management": "FOLLOW_SCENE"}
 
 
 def has_values(item: bpy_struct, values: Mapping[str, object]) -> bool:
-    """Tell whether an item's properties have these values."""
+    """Tell whether all properties in `values`, by name, have these values in an item."""
     return all(getattr(item, name) == value for name, value in values.items())
 
 
 def covers_all(scene: Scene, strip: Strip) -> bool:
-    """Tell whether an effect strip's picture, where it is opaque, covers all below unchanged, at all frames."""
+    """Tell whether an effect strip's picture is shown unchanged and fills the whole image, at all its frames.
+
+    Where it is opaque, it then covers everything below.
+    """
     size, shown = scene.render, strip.scene.render
     return (
         strip.blend_type in ("REPLACE", "ALPHA_OVER")
@@ -48,12 +54,13 @@ def covers_all(scene: Scene, strip: Strip) -> bool:
 
 
 def strip_at(scene: Scene, frame: int, but: str | None = None) -> tuple[Strip, bool] | None:
-    """Return the effect strip that alone is seen of a scene at a frame (`covers_all`), and whether Blender blends it.
-
-    Blending it over something changes bits.
+    """Return the effect strip that is alone visible in a scene at a timeline frame; None: there is none.
 
     Args:
         but: Name of a strip that does not count.
+
+    Returns:
+        The strip, and whether Blender blends it with one below, which changes bits of the colors.
     """
     editor = scene.sequence_editor
     if has_animation(scene, ".mute"):
@@ -76,7 +83,7 @@ def strip_at(scene: Scene, frame: int, but: str | None = None) -> tuple[Strip, b
 
 
 def has_known_levels(scene: Scene) -> bool:
-    """Tell whether a scene's render makes 8-bit levels of the sequencer's picture by sRGB alone."""
+    """Tell whether a scene's render makes 8-bit levels of the sequencer's picture by the sRGB curve alone."""
     return (
         bpy.app.version < _KNOWN_TO
         and not versions.colours()
@@ -94,7 +101,10 @@ def has_known_levels(scene: Scene) -> bool:
 
 
 def has_animation(scene: Scene, part: str) -> bool:
-    """Tell whether a property of the scene whose path contains `part` may be animated; with NLA tracks, any may."""
+    """Tell whether any property of a scene whose data path contains `part` may be animated.
+
+    With NLA tracks, all may be.
+    """
     animation = scene.animation_data
     if animation is None:
         return False

@@ -1,4 +1,4 @@
-"""The footage of a source strip: its files, how it is opened, its timing, retiming keys and proxies."""
+"""The footage of a source strip: its files, how they are opened, and the strip's timing, retiming keys and proxies."""
 
 import ctypes
 import math
@@ -37,9 +37,9 @@ _known: RecentValues[Hashable, Any] = RecentValues()  # what `stamps` and `spec`
 
 
 def media_key(strip: Strip) -> tuple:
-    """Return what the strip reads and how; equal keys give the same frames.
+    """Return a key of what a strip reads and how; equal keys give the same frames.
 
-    The first and the last file count as they are now, others as look_again found them.
+    Of many files, the first and the last are checked now, the others only after look_again.
 
     Raises:
         MediaError: It has no files.
@@ -51,17 +51,22 @@ def media_key(strip: Strip) -> tuple:
 
 
 def look_again() -> None:
-    """Have all files checked at the next look."""
+    """Forget what is known of files on disk, so that all are checked when they are next needed."""
     _known.clear()
 
 
 def stamps(place: Hashable, files: Callable[[], Iterable[Path]]) -> int:
-    """Return a number that changes when look_again finds that a file of a sequence was replaced. `place` is its key."""
+    """Return a number for the state of files on disk. It changes only after look_again, if one was replaced.
+
+    Args:
+        place: A key for the group of files, under which the number is kept.
+        files: Returns their paths.
+    """
     return _known.ask(place, lambda: hash(tuple(map(stamp, files()))), _KEPT)
 
 
 def reading(strip: Strip) -> tuple:
-    """Return how the strip's files are read: color space, alpha and the like."""
+    """Return the settings by which a strip's files are read: color space, alpha and the like."""
     clip = strip.clip if strip.type == "MOVIECLIP" else None
     reader = clip if strip.type == "MOVIECLIP" else strip
     return (
@@ -75,11 +80,11 @@ def reading(strip: Strip) -> tuple:
 
 @dataclass(frozen=True)
 class Proxy:
-    """What previews of one size read in place of a strip's footage.
+    """A strip's proxy: smaller files that previews of one size read in place of the footage.
 
     Attributes:
         path: A movie, or a folder with a picture for each of the strip's.
-        of_images: Whether it is a folder.
+        of_images: Whether `path` is a folder.
         stamp: Changes when the files are built again.
     """
 
@@ -90,11 +95,13 @@ class Proxy:
 
 @dataclass(frozen=True)
 class SourceSpec:
-    """What a source strip reads, and how, as plain data: equal specs give the same frames.
+    """A strip's footage and how it is read, as plain data: equal specs give the same frames.
 
     Attributes:
-        files: Of an image strip, one for each frame; None: a movie, or what is found beside `path`.
-        options: Arguments of media.open_source.
+        key: What media_key returns for the strip.
+        path: The movie, or the first picture.
+        files: A picture for each frame of a strip of images; None for a movie.
+        options: Further arguments of media.open_source.
     """
 
     key: tuple
@@ -103,11 +110,11 @@ class SourceSpec:
     options: dict = field(compare=False)
 
     def open(self, divisor: int = 1, proxy: Proxy | None = None) -> FrameSource:
-        """Open the footage as Blender shows it.
+        """Open the footage, with colors and alpha as Blender's strip shows them.
 
         Args:
-            divisor: As in media.open_source.
-            proxy: Where frames are read from, if it fits.
+            divisor: Reduces the frames' size, as in media.open_source.
+            proxy: The proxy to read frames from, if it fits the footage; None: the footage.
 
         Raises:
             MediaError: It cannot be read.
@@ -124,7 +131,11 @@ class SourceSpec:
 
 
 def spec(strip: Strip) -> SourceSpec:
-    """Return what a source strip reads. MediaError: it has no files."""
+    """Return a strip's footage and how it is read.
+
+    Raises:
+        MediaError: The strip has no files.
+    """
     key = media_key(strip)
     return _known.ask(key, lambda: _spec(strip, key), _KEPT)
 
@@ -145,15 +156,19 @@ def _spec(strip: Strip, key: tuple) -> SourceSpec:
 
 
 def open_media(strip: Strip) -> FrameSource:
-    """Open the strip's footage as Blender shows it. MediaError: it cannot be read."""
+    """Open a strip's footage, with colors and alpha as the strip shows them.
+
+    Raises:
+        MediaError: It cannot be read.
+    """
     return spec(strip).open()
 
 
 def files(strip: Strip) -> list[Path]:
-    """Return the files of a movie, image or clip strip, even if they are missing or effects cannot use them.
+    """Return the files of a movie, image or clip strip, including missing ones and ones that effects cannot use.
 
     Raises:
-        MediaError: It has none.
+        MediaError: It names none.
     """
     count, path = _clip_files(strip) if strip.type == "MOVIECLIP" else _files(strip)
     return list(map(path, range(count)))
@@ -165,13 +180,17 @@ def first_frame(strip: Strip) -> int:
 
 
 def is_movie(strip: Strip) -> bool:
-    """Tell whether a movie, image or clip strip reads a movie."""
+    """Tell whether a movie, image or clip strip reads a movie file, not pictures."""
     clip = strip.clip if strip.type == "MOVIECLIP" else None
     return strip.type == "MOVIE" or (clip is not None and clip.source == "MOVIE")
 
 
 def _files(strip: Strip) -> tuple[int, Callable[[int], Path]]:
-    """Return the number of the strip's files, and a function from an index to a path."""
+    """Return the number of a strip's files, and a function from an index to a path.
+
+    Raises:
+        MediaError: It names none, or it is a clip strip that is undistorted or stabilized.
+    """
     if strip.type == "MOVIECLIP":
         if strip.clip is not None and (strip.undistort or strip.stabilize2d):
             sentence = rpt_('strip "{strip}": undistorted or stabilized clips are not supported')
@@ -187,7 +206,11 @@ def _files(strip: Strip) -> tuple[int, Callable[[int], Path]]:
 
 
 def _clip_files(strip: Strip) -> tuple[int, Callable[[int], Path]]:
-    """Return a clip's movie, or its images by number without gaps, as _files does."""
+    """Return a clip's files as _files does: its movie, or its pictures by number, whether they exist or not.
+
+    Raises:
+        MediaError: The strip has no clip.
+    """
     clip = strip.clip
     if clip is None:
         raise MediaError(rpt_('strip "{strip}" has no clip').format(strip=strip.name))
@@ -199,7 +222,7 @@ def _clip_files(strip: Strip) -> tuple[int, Callable[[int], Path]]:
 
 
 def timing_of(strip: Strip) -> StripTiming:
-    """Return the timing of a source strip as plain data."""
+    """Return which frame of its footage a source strip shows when, as plain data."""
     render = strip.id_data.render
     keys = retiming_keys(strip)
     is_known = keys is not None
@@ -216,7 +239,7 @@ def timing_of(strip: Strip) -> StripTiming:
 
 
 def retiming_keys(strip: Strip) -> tuple[RetimingKey, ...] | None:
-    """Read the strip's retiming keys from Blender's memory; None: they cannot be read.
+    """Return a strip's retiming keys, read from Blender's memory; None: they cannot be read.
 
     Python's API has only their frames, none for clip strips, and Blender 5.2 counts them from the start of the edit's
     first strip.
@@ -240,7 +263,11 @@ def are_retiming_keys(keys: Sequence[RetimingKey]) -> bool:
 
 
 def proxy_of(scene: Scene, strip: Strip, percent: int) -> Proxy | None:
-    """Return what Blender reads of a strip in previews of a size in percent; None: the footage itself."""
+    """Return the proxy that previews read of a strip; None: they read the footage itself.
+
+    Args:
+        percent: Size of the preview: 25, 50, 75 or 100.
+    """
     if strip.type not in ("MOVIE", "IMAGE") or not strip.use_proxy or not getattr(strip.proxy, f"build_{percent}"):
         return None
     if strip.proxy.use_proxy_custom_file or strip.proxy.use_proxy_custom_directory:
@@ -257,18 +284,27 @@ def proxy_of(scene: Scene, strip: Strip, percent: int) -> Proxy | None:
 
 
 def of_image(folder: Path, image: str | Path) -> Path:
-    """Return the proxy of an image file."""
+    """Return the proxy file of an image file, in a folder of proxies."""
     return folder / f"{Path(image).name}_proxy.jpg"
 
 
 def _folder(scene: Scene, beside: Path) -> Path:
-    """Return the folder of proxies. `beside` is the folder of the footage."""
+    """Return the folder in which Blender keeps proxies.
+
+    Args:
+        beside: Folder of the footage.
+    """
     if scene.sequence_editor.proxy_storage == "PROJECT":  # Blender finds it from the open file
         return Path(bpy.path.abspath(scene.sequence_editor.proxy_dir or "//BL_proxy"))
     return beside / "BL_proxy"
 
 
 def _proxy(path: Path, *files: Path) -> Proxy | None:
-    """Return a proxy, or None if a file is missing. `files` are those of a folder that are checked."""
+    """Return a proxy; None: a file of it is missing.
+
+    Args:
+        path: A movie, or a folder of pictures.
+        files: Of a folder, the pictures that have to exist.
+    """
     stamps = tuple(map(stamp, files or (path,)))
     return None if None in stamps else Proxy(path, bool(files), stamps)

@@ -1,4 +1,8 @@
-"""Effect strips: Scene strips above their source, and the scene, effect and source that belong to them."""
+"""Find effect strips, and the scene, effect and source strip that belong to them.
+
+An effect strip is a Scene strip above a movie, image or clip strip, its source. The effect scene that it shows is
+rendered by our engine.
+"""
 
 import math
 from collections.abc import Iterable
@@ -23,33 +27,33 @@ IN_CODE_VALUES = 1 + 2**-23
 
 
 def is_carried(region: PropertyGroup) -> bool:
-    """Tell whether a region is a subject, or an outline that is tracked from drawing to drawing."""
+    """Tell whether a region is a subject, or an outline that is tracked from drawing to drawing through the footage."""
     return region.kind == "SUBJECT" or (region.kind == "OUTLINE" and region.between != "STRAIGHT")
 
 
 def all_strips(scene: Scene) -> Iterable[Strip]:
-    """Return the scene's strips, with those in meta strips."""
+    """Return a scene's strips, including those inside meta strips."""
     return scene.sequence_editor.strips_all if scene.sequence_editor else ()
 
 
 def effect_strips(scene: Scene) -> list[Strip]:
-    """Return the scene's effect strips, with those in meta strips."""
+    """Return a scene's strips that show effects, including those inside meta strips."""
     found = [strip for strip in all_strips(scene) if strip.type == "SCENE" and strip.scene]
     return [strip for strip in found if strip.scene.render.engine == ENGINE]
 
 
 def scene_of_uid(uid: int | None) -> Any:
-    """Return the scene of a session_uid, or None."""
+    """Return the scene with a session_uid; None: there is none."""
     return next((scene for scene in bpy.data.scenes if scene.session_uid == uid), None)
 
 
 def local_scenes() -> list:
-    """Return the scenes that can be changed; linked ones cannot."""
+    """Return the scenes that can be changed: those that are not linked from another file."""
     return [scene for scene in bpy.data.scenes if scene.library is None]
 
 
 def own_strips(scene: Scene) -> list[Strip]:
-    """Return the strips that were made for effects, even if their scene has another engine or was deleted."""
+    """Return a scene's strips that were made for effects, even if their effect scene is gone or has another engine."""
     return [strip for strip in all_strips(scene) if strip.type == "SCENE" and _is_own(strip)]
 
 
@@ -61,14 +65,16 @@ def _is_own(strip: Strip) -> bool:
 
 
 def effect_of(scene: Scene, effect_scene: Scene) -> Any:
-    """Return the scene's effect that an effect scene shows, or None."""
+    """Return the effect of `scene` that belongs to an effect scene; None: there is none."""
     return next((effect for effect in scene.virtual_shutter.effects if effect.scene == effect_scene), None)
 
 
 def find_effect(effect_scene: Scene, scene_frame: float = 0) -> tuple[Scene, PropertyGroup, Strip]:
-    """Return the scene, the effect and an effect strip of an effect scene.
+    """Return the scene, the effect and the effect strip that an effect scene belongs to.
 
-    Of the parts of a cut strip, the one counts that shows the frame of the effect scene, else the first.
+    Args:
+        scene_frame: Frame of the effect scene. Of several parts of a cut strip, the one that shows it is returned, or
+            else the first.
 
     Raises:
         EffectError: No strip shows the effect scene.
@@ -83,12 +89,15 @@ def find_effect(effect_scene: Scene, scene_frame: float = 0) -> tuple[Scene, Pro
 
 
 def origin(strip: Strip) -> float:
-    """Return the timeline frame at which untrimmed content would start: the same for all parts of a cut strip."""
+    """Return the timeline frame at which a strip's content would start if it were not trimmed.
+
+    It is the same for all parts of a cut strip.
+    """
     return strip.content_start - strip.content_trim_start
 
 
 def skipped(strip: Strip) -> int:
-    """Return the number of frames of its content that a strip skips before the first that it shows."""
+    """Return how many frames of its content are trimmed from a strip's beginning."""
     return math.floor(strip.left_handle - origin(strip))
 
 
@@ -103,15 +112,15 @@ def is_at(strip: Strip, frame: float) -> bool:
 
 
 def timeline_frame(strip: Strip, scene_frame: float) -> float:
-    """Return the timeline frame at which an effect strip shows a frame of its scene."""
+    """Return the timeline frame at which an effect strip shows a frame of its effect scene."""
     return origin(strip) + scene_frame - strip.scene.frame_start
 
 
 def source_of(scene: Scene, effect: PropertyGroup, strip: Strip) -> Strip:
     """Return the source strip of an effect strip.
 
-    Parts of a cut strip and copies share the source identity of an effect. The nearest in time counts, then
-    one in the same meta strip, a connected one, and the nearest channel, below first.
+    Parts of a cut source and copies of it have the same identity. Of several, the nearest in time counts, then one in
+    the same meta strip, a connected one, and the nearest channel, below first.
 
     Raises:
         EffectError: It was deleted, or is not a movie, image or clip strip.
@@ -125,7 +134,7 @@ def source_of(scene: Scene, effect: PropertyGroup, strip: Strip) -> Strip:
 
 
 class Shown(NamedTuple):
-    """An effect, its strip, and its source strip, or None."""
+    """An effect with a strip that shows it, and the strip's source; None: the source is missing."""
 
     effect: PropertyGroup
     strip: Strip
@@ -133,18 +142,18 @@ class Shown(NamedTuple):
 
 
 def shown_effects(scene: Scene) -> list[Shown]:
-    """Return the effects that the scene's strips show."""
+    """Return a scene's effect strips, each with its effect and its source."""
     pairs = [(effect, strip) for strip in effect_strips(scene) if (effect := effect_of(scene, strip.scene))]
     return [Shown(effect, strip, nearest_source(scene, effect, strip)) for effect, strip in pairs]
 
 
 def with_sources(scene: Scene) -> list[Any]:
-    """Return the effects that the scene's strips show and that have a source."""
+    """Return a scene's effect strips that have a source, each with its effect and its source."""
     return [each for each in shown_effects(scene) if each.source is not None]
 
 
 def nearest_source(scene: Scene, effect: PropertyGroup, strip: Strip) -> Any:
-    """Return the source strip as source_of finds it, or None."""
+    """Return the source strip that source_of finds; None: there is none."""
     connected = list(strip.connections)  # a duplicated pair stays connected
 
     def distance(other: Strip) -> tuple:
@@ -158,12 +167,16 @@ def nearest_source(scene: Scene, effect: PropertyGroup, strip: Strip) -> Any:
 
 
 def identified(scene: Scene, name: str, identity: str) -> list:
-    """Return the scene's strips with an identity in a property, whatever their type; "" identifies none."""
+    """Return a scene's strips, of any type, whose property `name` has this identity. The identity "" finds none."""
     return [strip for strip in all_strips(scene) if getattr(strip, name) == identity != ""]
 
 
 def invalidate(scene: Scene, effect_scene: Scene | None = None) -> None:
-    """Drop the sequencer's finished frames of a scene's effect strips, or only of those that show one effect scene."""
+    """Drop the frames that Blender's sequencer keeps of a scene's effect strips, so that they are made again.
+
+    Args:
+        effect_scene: Only for strips that show this one; None: for all.
+    """
     revision.changed()
     for strip in effect_strips(scene):
         if effect_scene is None or strip.scene == effect_scene:
@@ -171,6 +184,6 @@ def invalidate(scene: Scene, effect_scene: Scene | None = None) -> None:
 
 
 def used_regions(effect: PropertyGroup) -> list:
-    """Return the regions with a shutter, in order."""
+    """Return an effect's regions whose shutter exists, in order."""
     names = {shutter.name for shutter in effect.shutters}
     return [region for region in effect.regions if region.shutter in names]

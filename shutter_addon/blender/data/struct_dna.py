@@ -1,4 +1,4 @@
-"""The layout of records in Blender's memory, from the running Blender.
+"""Where fields lie in records (C structs) of Blender's memory, found at run time, to read what Python's API lacks.
 
 Every .blend file ends with a description of all records (SDNA). Blender writes its own, and its compiler has checked
 the offsets and sizes (dna_verify.cc). An empty file is written once and parsed.
@@ -20,16 +20,17 @@ _POINTER = 8  # bytes
 
 
 class LayoutError(Exception):
-    """This Blender stores a record differently, or its layout cannot be read."""
+    """This Blender lays a record out differently, or its layout cannot be read."""
 
 
 @cache
 def record(name: str, *fields: tuple[str, str]) -> np.dtype:
-    """Return the type of a record in Blender's memory with some of its fields.
+    """Return the NumPy type of a record (C struct) in Blender's memory, limited to some of its fields.
 
     Args:
-        fields: Each as Blender declares it, and as NumPy reads it: ("char name[64]", "S64"). A list has two addresses,
-            of its first and its last item.
+        name: The struct's name in Blender's source.
+        fields: Each as Blender declares it, and as NumPy reads it: ("char name[64]", "S64"). A linked list has two
+            addresses, of its first and its last item.
 
     Raises:
         LayoutError: This Blender has no such record or field.
@@ -43,16 +44,23 @@ def record(name: str, *fields: tuple[str, str]) -> np.dtype:
 
 
 def read(kind: np.dtype, address: int) -> tuple:
-    """Return the fields of a record (`record`) at an address in Blender's memory: numbers, bytes and lists."""
+    """Return the fields of a record at an address in Blender's memory: numbers, bytes and lists.
+
+    Args:
+        kind: The record's type, from `record`.
+    """
     fields = np.frombuffer(ctypes.string_at(address, kind.itemsize), kind)[0]
     return tuple(fields[name].tolist() for name in kind.names or ())
 
 
 @cache
 def described() -> dict[str, tuple[int, dict[str, int]]]:
-    """Return size and field offsets in bytes of each record, with fields as declared; empty: they cannot be read.
+    """Return the layout of all records in Blender's memory, by their name.
 
-    It is kept even if empty, because masks are read at every frame.
+    Returns:
+        The record's size in bytes, and the offset in bytes of each field, by its declaration. Empty if the layout
+        cannot
+        be read; that is kept, too, because masks are read at every frame.
     """
     try:
         with tempfile.TemporaryDirectory(prefix="virtual_shutter_dna_", ignore_cleanup_errors=True) as folder:
@@ -64,7 +72,7 @@ def described() -> dict[str, tuple[int, dict[str, int]]]:
 
 
 def parsed(blend: bytes) -> dict[str, tuple[int, dict[str, int]]]:
-    """Parse the description at the end of an uncompressed .blend file, as `described` returns it.
+    """Parse the description of records at the end of an uncompressed .blend file. Return them as `described` does.
 
     Raises:
         ValueError, IndexError, struct.error: There is none.
@@ -90,7 +98,11 @@ def parsed(blend: bytes) -> dict[str, tuple[int, dict[str, int]]]:
 
 
 def _words(data: memoryview, at: int) -> tuple[list[str], int]:
-    """Return the words behind a mark and their count, and the offset of the next mark."""
+    """Return a list of words from the description, and the offset of the part behind it.
+
+    Args:
+        at: Offset of the list's mark of four bytes, which its number of words follows.
+    """
     (count,) = struct.unpack_from("<i", data, at + 4)
     words = bytes(data[at + 8 :]).split(b"\0", count)[:count]
     end = at + 8 + sum(map(len, words)) + count
@@ -98,6 +110,11 @@ def _words(data: memoryview, at: int) -> tuple[list[str], int]:
 
 
 def _length(name: str, size: int) -> int:
-    """Return the bytes of a field: the size of its type or of a pointer, times its dimensions."""
+    """Return the bytes that a field takes: its type's size, or a pointer's, times its dimensions.
+
+    Args:
+        name: As declared, such as "*next" or "co[3]".
+        size: Bytes of the field's type.
+    """
     one = _POINTER if name.startswith(("*", "(*")) else size
     return one * math.prod(map(int, re.findall(r"\[(\d+)\]", name)))

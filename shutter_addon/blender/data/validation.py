@@ -1,4 +1,4 @@
-"""Check values of an effect in a .blend file, and name the place of one that is out of range.
+"""Check that values of an effect in a .blend file are in range, and tell the user where one is not.
 
 Blender keeps properties in range where users and F-curves set them. Scripts and files of other versions get past that,
 and NaN gets past every range.
@@ -27,7 +27,7 @@ _PLACES = {
 
 
 def place(group: PropertyGroup) -> str:
-    """Return the user's words for an effect, shutter, bar, region or camera."""
+    """Return what the user calls an effect, shutter, bar, region or camera, such as 'shutter "Sharp", bar 3'."""
     path = group.path_from_id()
     match = re.match(r".*?effects\[\d+\](?:\.(shutters|regions)\[\d+\])?", path)
     assert match  # the group is an effect, or lies in one
@@ -38,7 +38,10 @@ def place(group: PropertyGroup) -> str:
 
 
 def number(group: PropertyGroup, name: str, value: float | None = None) -> Any:
-    """Return a property's number, or `value` in place of it.
+    """Return a property's number after checking it.
+
+    Args:
+        value: Checked and returned in place of the property's own value.
 
     Raises:
         EffectError: It is out of the property's range.
@@ -55,13 +58,25 @@ def number(group: PropertyGroup, name: str, value: float | None = None) -> Any:
 
 
 def check(items: Sequence[PropertyGroup], name: str, numbers: np.ndarray) -> None:
-    """Raise EffectError where one of the numbers (n,) for the items of a collection is out of range."""
+    """Check a number for each item of a collection.
+
+    Args:
+        name: The items' property that the numbers are for.
+        numbers: (n,), one for each item.
+
+    Raises:
+        EffectError: One is out of the property's range.
+    """
     for item, value in zip(items, numbers.tolist(), strict=True):
         number(item, name, value)
 
 
 def check_moving(moving: PropertyGroup) -> None:
-    """Raise EffectError where a property of a region or the camera is out of range."""
+    """Check the numbers and the kind of a region or the camera.
+
+    Raises:
+        EffectError: One is out of range.
+    """
     for prop in moving.bl_rna.properties:
         if prop.identifier == "kind":
             word(moving, "kind")
@@ -70,7 +85,10 @@ def check_moving(moving: PropertyGroup) -> None:
 
 
 def word(group: PropertyGroup, name: str, value: float | None = None) -> Any:
-    """Return the identifier of an enum, or of the item with the number `value`.
+    """Return the identifier of an enum property's item.
+
+    Args:
+        value: Number of an item, from an F-curve; None: the item that is set.
 
     Raises:
         EffectError: There is no such item.
@@ -92,7 +110,7 @@ def _called(prop: Property) -> str:
 
 
 def why_full(effect: PropertyGroup, *, regions: int = 0, shutters: int = 0) -> str | None:
-    """Return why an effect cannot have this many more regions and shutters; None: it can."""
+    """Return why an effect cannot get this many more regions and shutters; None: it can."""
     if len(effect.regions) + regions > limits.MAX_REGIONS:
         return rpt_("An effect can have at most {most} regions").format(most=limits.MAX_REGIONS)
     if len(effect.shutters) + shutters > limits.MAX_SHUTTERS:

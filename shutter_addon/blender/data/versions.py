@@ -1,4 +1,4 @@
-"""The versions of the extension, of Blender, and of the open edit."""
+"""The versions that decide whether machines render the same frames: of the extension, Blender and the edit's files."""
 
 import hashlib
 import os
@@ -28,9 +28,10 @@ def extension() -> str:
 
 
 def colours() -> str:
-    """Return an identifier of Blender's OpenColorIO configuration; "": Blender's own, wherever it is installed.
+    """Return an identifier of the OpenColorIO configuration that Blender uses; "": the one that comes with Blender.
 
-    A built-in configuration of OpenColorIO has its name; a file has its SHA-256, without the tables that it names.
+    Returns:
+        The name of a configuration built into OpenColorIO, or the SHA-256 of a file, without the tables that it names.
     """
     # Blender sets OCIO to its own file when it starts, and its child processes inherit that.
     path = os.environ.get("BLENDER_OCIO", os.environ.get("OCIO", ""))
@@ -42,7 +43,11 @@ def colours() -> str:
 
 
 def of_edit(scene: Scene) -> EditVersion:
-    """Return the version of the edit in the open .blend file. OSError: the file is gone."""
+    """Return the version of the open edit: of the extension and of Blender, and digests of the .blend file and footage.
+
+    Raises:
+        OSError: The .blend file is gone.
+    """
     with open(bpy.data.filepath, "rb") as file:
         blend = hashlib.file_digest(file, "sha256").hexdigest()
     footage = hashlib.sha256()
@@ -54,13 +59,13 @@ def of_edit(scene: Scene) -> EditVersion:
 
 
 def read_files(scene: Scene) -> list[Path]:
-    """Return all files that the edit is made from, except the .blend file: those of pictures, and of all sounds."""
+    """Return all files outside the .blend file that the edit reads: those of its pictures, and all sounds."""
     sounds = map(external_files.named, bpy.data.sounds)
     return [path for files in (*_footage_files(scene), *sounds) for path in files]
 
 
 def _footage_files(scene: Scene) -> Iterator[list[Path]]:
-    """Yield lists of the files that the edit's pictures are made from: of strips, of shown edits, and of other data."""
+    """Yield the files that the edit's pictures are made from, a list for each strip and each data-block."""
     for shown in requirements.shown_scenes(scene):
         for strip in shown.sequence_editor.strips_all:
             if strip.type in strips.SOURCES:
@@ -74,14 +79,21 @@ def _footage_files(scene: Scene) -> Iterator[list[Path]]:
 
 
 def digests(files: list[Path]) -> list[bytes | None]:
-    """Return digests of files' contents, read in parallel; None for one that is missing or unreadable."""
+    """Return a digest of each file's contents; None for a file that is missing or unreadable.
+
+    They are read in parallel. If there are more than _FEW, only blocks of larger files are read.
+    """
     whole = derived.WHOLE if len(files) <= _FEW else _BLOCKS
     with threads.pool(_READERS) as pool:
         return list(pool.map(partial(_digest, whole=whole), files))
 
 
 def _digest(path: Path, whole: int) -> bytes | None:
-    """Return derived.content_digest, or None for a file that is missing or unreadable."""
+    """Return the digest of a file's contents; None: it is missing or unreadable.
+
+    Args:
+        whole: Bytes up to which a file is read as a whole, as in derived.content_digest.
+    """
     try:
         return derived.content_digest(path, whole)
     except MediaError:

@@ -1,1 +1,1 @@
-"""Blender's own GPU as a device, and the choice of the device that renders."""
+"""Blender's own GPU as a device that composes pictures, and the choice of the device that renders."""

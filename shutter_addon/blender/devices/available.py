@@ -1,4 +1,4 @@
-"""Choose the device that renders: a separate OpenGL 4.3 context, else Blender's own GPU, else NumPy."""
+"""Choose the device that composes renders: a separate OpenGL 4.3 context, else Blender's own GPU, else NumPy."""
 
 import threading
 from collections.abc import Callable
@@ -29,17 +29,17 @@ OPEN: dict[str, Callable[..., Compositor]] = {
 
 
 def choose(wanted: str, *, window_waits: bool = False) -> tuple[str, str | None]:
-    """Choose the device that renders.
+    """Choose the device that composes renders.
 
     Args:
-        wanted: one of CHOICES
-        window_waits: whether Blender's window waits for the picture, so that its GPU cannot be used
+        wanted: One of CHOICES.
+        window_waits: Whether Blender's window waits for the picture, so that its GPU cannot be used.
 
     Returns:
-        A key of OPEN. If "auto" found only a slower device, also a sentence for the user that says why.
+        A key of OPEN. If "auto" found only a slower device, also a sentence for the user that says why, else None.
 
     Raises:
-        NoDeviceError: the wanted device is missing
+        NoDeviceError: The wanted device is missing.
     """
     if wanted == "cpu":
         return "cpu", None
@@ -64,14 +64,24 @@ def choose(wanted: str, *, window_waits: bool = False) -> tuple[str, str | None]
 
 
 def name(kind: str) -> str:
-    """Return the name of a device, a key of OPEN."""
+    """Return the name of a device for the user, such as its GPU's.
+
+    Args:
+        kind: A key of OPEN.
+    """
     if kind == "cpu":
         return "NumPy"
     return opengl().name if kind == "opengl" else gpu.platform.renderer_get()
 
 
 class OpenGL(NamedTuple):
-    """Facts of OpenGL 4.3: its renderer, the bytes that textures may take; or why there is none."""
+    """What a trial of OpenGL 4.3 found.
+
+    Attributes:
+        name: Of its renderer.
+        memory: The most bytes that textures may take.
+        lacking: Why OpenGL 4.3 cannot be used; None: it can.
+    """
 
     name: str = ""
     memory: int | None = None
@@ -80,7 +90,10 @@ class OpenGL(NamedTuple):
 
 @cache
 def opengl() -> OpenGL:
-    """Try OpenGL 4.3, once. A separate thread does it: where Blender's context is current, another may fail."""
+    """Find out once whether OpenGL 4.3 can be used, and keep the answer.
+
+    It is tried on a separate thread, because where Blender's context is current, another may fail.
+    """
     return threads.start(_tried).result()
 
 

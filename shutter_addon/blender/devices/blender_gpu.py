@@ -1,8 +1,8 @@
-"""Blender's own GPU as a device, through the `gpu` module, on OpenGL, Vulkan and Metal.
+"""Blender's own GPU as a device for compute passes, through the `gpu` module, on OpenGL, Vulkan and Metal.
 
-Python can only send floats, and only whole textures. So data is sent in a float texture, and a pass unpacks it into the
-layer. Small samples are packed into whole numbers up to 2²⁴, which floats hold exactly. (Bit patterns would be simpler,
-but a GPU may flush denormal floats.)
+Python can only send floats, and only whole textures. So data is sent in a float texture, and a pass unpacks it into a
+layer of the wanted texture. Small samples are packed into whole numbers up to 2²⁴, which floats hold exactly. (Bit
+patterns would be simpler, but a GPU may flush denormal floats.)
 """
 
 from __future__ import annotations
@@ -44,10 +44,10 @@ LETTING_GO = read_pass("blender_gpu", "LET_GO")
 
 
 def has_context() -> bool:
-    """Return whether Blender's GPU is current on this thread, as it is where Blender draws.
+    """Tell whether Blender's GPU can be used on this thread now, as it can where Blender draws.
 
-    It is not current after a window was closed, until another one is drawn. Running a pass or freeing a shader would
-    crash Blender then.
+    After a window was closed it cannot, until another window is drawn. Running a pass or freeing a shader would crash
+    Blender then.
     """
     try:
         GPUTexture((1, 1))
@@ -57,25 +57,29 @@ def has_context() -> bool:
 
 
 def require_context() -> None:
-    """Raise NoDeviceError if Blender's GPU is not current on this thread."""
+    """Check that Blender's GPU can be used on this thread now.
+
+    Raises:
+        NoDeviceError: It cannot.
+    """
     if not has_context():
         raise NoDeviceError(rpt_("Blender's GPU cannot be used until a window is drawn"))
 
 
 def free(*objects: object) -> None:
-    """Free textures and shaders that nothing else refers to, now or once Blender's GPU is current."""
+    """Free textures and shaders of the `gpu` module: now, or when Blender's GPU can next be used (free_unused)."""
     BlenderDevice.unused.extend(objects)
     if has_context():
         free_unused()
 
 
 def free_unused() -> None:
-    """Free what could not be freed before. Call it where Blender's GPU is current."""
+    """Free what `free` had to postpone. To be called where Blender's GPU can be used."""
     BlenderDevice.unused.clear()
 
 
 class BlenderDevice(Device):
-    """A Device where Blender's GPU context is current: in draw handlers, or after gpu.init().
+    """Blender's GPU as a Device, for code that runs where it can be used: in draw handlers, or after gpu.init().
 
     Private methods take and return the gpu module's textures. RelayedDevice calls them on the main thread.
     """
@@ -92,20 +96,25 @@ class BlenderDevice(Device):
         self.max_size = gpu.capabilities.max_texture_size_get()
 
     def current(self) -> AbstractContextManager[BlenderDevice]:
-        """See Device."""
+        """Check that Blender's GPU can be used on this thread now, and return a context in which passes run.
+
+        Raises:
+            NoDeviceError: It cannot be used.
+        """
         require_context()
         free_unused()
         return self._cleared()
 
     def freeing(self) -> AbstractContextManager[BlenderDevice]:
-        """See Device."""
+        """Return a context in which textures may be released. They are freed once Blender's GPU can be used."""
         return nullcontext(self)
 
     def _cleared(self) -> AbstractContextManager[BlenderDevice]:
-        """Unbind our textures from the current OpenGL context, if there is one.
+        """Unbind this device's textures on OpenGL, and return the context that `current` returns.
 
-        Blender has one context for an engine's render and one for drawing. A texture that is freed in one stays bound
-        in the other. Blender and Mesa take a new texture with the same number for that one, so passes would use it.
+        Blender has one OpenGL context for an engine's render and one for drawing. A texture that is freed in one stays
+        bound in the other. Blender and Mesa take a new texture with the same number for that one, so passes would use
+        it.
         """
         if gpu.platform.backend_type_get() == "OPENGL":
             if self._spare is None:
@@ -133,7 +142,10 @@ class BlenderDevice(Device):
             self._send(texture.gpu, unpacking, sent, top, layer)
 
     def send(self, texture: Texture, frame: np.ndarray) -> Texture:
-        """See Device. The numbers need no unpacking."""
+        """Send an opaque 8-bit frame for the next pass, as Device.send does: as the numbers of an r32f texture.
+
+        Frames that are too large to be sent at once are written to `texture` instead.
+        """
         height, width = frame.shape[:2]
         if width * height * texel_bytes("r32f") > _SENT_BYTES:
             return super().send(texture, frame)
@@ -141,13 +153,25 @@ class BlenderDevice(Device):
         return Texture(None, (width, height, 1), "r32f", _new((width, height), "R32F", data))
 
     def _send(self, stored: GPUTexture, program: Pass, sent: tuple, top: int, layer: int) -> None:
-        """Send numbers and unpack them into a layer. sent: arguments of _new."""
+        """Send one band of a frame to the GPU, and run the pass that unpacks it.
+
+        Args:
+            stored: The texture to fill.
+            program: The pass that unpacks.
+            sent: Arguments of _new for the texture that is sent.
+            top: First row of the band in the layer.
+            layer: Layer of `stored`.
+        """
         textures, size = {"sent": _new(*sent)}, sent[0]
         constants = {"size": size, "top": top, "layer": layer}
         BlenderDevice._dispatch(self, program, program.groups(size), textures, {"stored": stored}, {}, constants)
 
     def read(self, texture: Texture) -> np.ndarray:
-        """See Device."""
+        """Return a copy of a texture (layers, height, width, components) in its format's NumPy type.
+
+        Raises:
+            KeyError: Its format is none of FORMATS.
+        """
         width, height, layers = texture.size
         dtype, _, packing = FORMATS[texture.kind]
         components = 4 if texture.kind.startswith("rgba") else 1
@@ -186,7 +210,7 @@ class BlenderDevice(Device):
 
 
 def texel(texture: Texture, x: int, y: int) -> np.ndarray:
-    """Return the numbers (4 · layers,) float32 of all layers of an rgba32f texture at one texel."""
+    """Return what an rgba32f texture holds at one texel, (4 · layers,) float32: four numbers for each layer."""
     values = np.empty((texture.size[2], 4), np.float32)
     for layer, pixel in enumerate(values):
         _read_layer(texture.gpu, layer, (x, y, 1, 1), 4, "FLOAT", pixel)
@@ -194,7 +218,14 @@ def texel(texture: Texture, x: int, y: int) -> np.ndarray:
 
 
 def _read_layer(texture: GPUTexture, layer: int, box: tuple, components: int, kind: str, pixels: np.ndarray) -> None:
-    """Read a box (left, bottom, width, height) of a layer. GPUTexture.read() reads only the first layer."""
+    """Read a box of one layer into `pixels`. GPUTexture.read() could read only the first layer.
+
+    Args:
+        box: Left, bottom, width and height in texels.
+        components: Numbers for each texel.
+        kind: "FLOAT" or "UINT", the type of the numbers.
+        pixels: Contiguous array that receives them.
+    """
     framebuffer = gpu.types.GPUFrameBuffer(color_slots={"texture": texture, "layer": layer})
     with framebuffer.bind():
         framebuffer.read_color(*box, components, 0, kind, data=_buffer(kind, pixels))
@@ -202,9 +233,9 @@ def _read_layer(texture: GPUTexture, layer: int, box: tuple, components: int, ki
 
 @cache
 def opens_in_background() -> bool:
-    """Return whether Blender's GPU can be used without a window. If so, it is current on the main thread from then on.
+    """Tell whether Blender's GPU can be used without a window; if so, make it usable on the main thread.
 
-    Another Blender process tries first: without a GPU, gpu.init() of Blender 5.2 crashes.
+    Another Blender process tries first, because without a GPU, gpu.init() of Blender 5.2 crashes. The answer is kept.
     """
     try:
         subprocess.run(_trial(), check=True, capture_output=True, timeout=60)
@@ -215,7 +246,7 @@ def opens_in_background() -> bool:
 
 
 def _trial() -> list[str]:
-    """Return the command that tries gpu.init() with this process's backend."""
+    """Return the command line of a process that tries gpu.init() with the GPU backend of this process."""
     if bpy.app.module:
         return [sys.executable, "-c", "import bpy, gpu; gpu.init()"]
     given = dict(pairwise(sys.argv)).get("--gpu-backend", bpy.context.preferences.system.gpu_backend.lower())
@@ -224,7 +255,16 @@ def _trial() -> list[str]:
 
 
 def _new(size: tuple[int, int], kind: str, data: gpu.types.Buffer | None = None, layers: int = 1) -> GPUTexture:
-    """Return a texture, filled with numbers. Raise NoDeviceError if the GPU has no room for it."""
+    """Make a texture.
+
+    Args:
+        size: Width and height in texels.
+        kind: The format, such as "RGBA32F".
+        data: Numbers to fill it with; None: its content is undefined.
+
+    Raises:
+        NoDeviceError: The GPU has no room for it.
+    """
     try:
         return GPUTexture(size, layers=layers, format=kind, data=data)
     except RuntimeError as error:
@@ -232,7 +272,11 @@ def _new(size: tuple[int, int], kind: str, data: gpu.types.Buffer | None = None,
 
 
 def _buffer(kind: str, array: np.ndarray) -> gpu.types.Buffer:
-    """Return Blender's view of a contiguous array, without a copy."""
+    """Return a buffer of the `gpu` module over the memory of a contiguous array, without a copy.
+
+    Args:
+        kind: "FLOAT" or "UINT".
+    """
     return gpu.types.Buffer(kind, array.size, array.reshape(-1))
 
 
@@ -246,7 +290,12 @@ def _packed(array: np.ndarray, packing: int) -> np.ndarray:
 
 
 def shader_info(samplers: Mapping[str, str], constants: Mapping[str, str]) -> gpu.types.GPUShaderCreateInfo:
-    """Return the description of a shader with these samplers and constants, by name with their GLSL types."""
+    """Return the description of a shader for the `gpu` module, with its samplers and constants declared.
+
+    Args:
+        samplers: GLSL type of each sampler, by name.
+        constants: GLSL type of each push constant, by name.
+    """
     info = gpu.types.GPUShaderCreateInfo()
     for slot, (name, kind) in enumerate(samplers.items()):
         info.sampler(slot, _TYPES[kind], name)

@@ -1,9 +1,9 @@
-"""Calls from other threads to Blender's main thread, which owns Blender's data, operators and GPU.
+"""Calls from other threads to Blender's main thread, which alone may use Blender's data, operators and GPU.
 
-Functions wait in a queue for a timer, as Blender's manual recommends. Timers may be registered only on the main thread:
-Blender iterates over them without a lock. RelayedDevice is Blender's GPU for other threads: the main thread makes its
-calls, a few at a time between redraws. With an engine's bl_use_gpu_context, Blender would hold a lock while a picture
-is made, and draw no window meanwhile.
+Functions wait in a queue, which a timer empties, as Blender's manual recommends. Timers may be registered only on the
+main thread: Blender iterates over them without a lock. RelayedDevice is Blender's GPU for other threads: the main
+thread makes its calls, a few at a time between redraws. With an engine's bl_use_gpu_context, Blender would hold a lock
+while a picture is made, and draw no window meanwhile.
 """
 
 import queue
@@ -35,16 +35,16 @@ _TICK = 0.02  # seconds between two looks at the queue
 
 @dataclass
 class _MainThread:
-    """What other threads ask of the main thread.
+    """What other threads want the main thread to do. Times are in seconds of time.monotonic.
 
     Attributes:
-        functions: of `soon`, for the timer
-        calls: of relayed devices, as (future, function). They also run while Blender draws, when no data may change.
-        timers: timers to remove when the extension is disabled
-        until: when it stops looking for more calls
-        looked: when it last looked
-        unfinished: passes that may still run
-        batch: the number of passes after which it waits for them
+        functions: From `soon`, for the timer.
+        calls: Of relayed devices, as (future, function). They also run while Blender draws, when no data may change.
+        timers: Timers to remove when the extension is disabled.
+        until: Time at which it stops waiting for more calls.
+        looked: Time at which it last made calls.
+        unfinished: Passes that the GPU may still be running.
+        batch: Number of unfinished passes after which the main thread waits for the GPU.
     """
 
     functions: queue.SimpleQueue[Callable[[], object]]
@@ -60,12 +60,19 @@ _main = _MainThread(queue.SimpleQueue(), queue.SimpleQueue(), set())  # Blender 
 
 
 def soon(function: Callable[[], object]) -> None:
-    """Have the main thread of a window call a function, in the order of these calls. Usable on any thread."""
+    """Have the main thread call a function when it next can, after those of earlier calls. Usable on any thread.
+
+    Only in a Blender with a window.
+    """
     _main.functions.put(function)
 
 
 def call_waiting() -> float:
-    """Call the waiting functions, and those of relayed devices: a timer that runs as long as the extension."""
+    """Call all functions that `soon` was given, and make calls of relayed devices. This is a timer of Blender.
+
+    Returns:
+        Seconds until Blender calls it again.
+    """
     for _ in range(_main.functions.qsize()):
         try:
             _main.functions.get_nowait()()
@@ -75,23 +82,29 @@ def call_waiting() -> float:
 
 
 def later(timer: Callable[[], float | None], seconds: float = 0.0, *, persistent: bool = False) -> None:
-    """Register a timer unless it is registered. Call it on the main thread."""
+    """Register a timer of Blender, unless it is registered already. To be called on the main thread.
+
+    Args:
+        timer: Returns the seconds until its next call, or None to end.
+        seconds: Until the first call.
+        persistent: Whether it goes on when another file is loaded.
+    """
     _main.timers.add(timer)
     if not bpy.app.timers.is_registered(timer):
         bpy.app.timers.register(timer, first_interval=seconds, persistent=persistent)
 
 
 def drop(*timers: Callable[[], float | None]) -> None:
-    """Unregister timers."""
+    """Unregister timers that `later` registered, as far as they still run."""
     for timer in filter(bpy.app.timers.is_registered, timers):
         bpy.app.timers.unregister(timer)
 
 
 class RelayedDevice(BlenderDevice):
-    """Blender's GPU as a Device for a thread other than the main one.
+    """Blender's GPU as a Device for a thread other than the main one, which makes the calls on its behalf.
 
-    Errors of a pass are raised later, at the latest when something is made, sent or read. Its textures are lists of
-    one, which the main thread empties: on Vulkan, Blender crashes if another thread frees a texture.
+    Errors of a pass are raised later, at the latest when something is made, sent or read. Its textures are lists of one
+    texture, which the main thread empties: on Vulkan, Blender crashes if another thread frees a texture.
     """
 
     def __init__(self, *memory: Any) -> None:
@@ -99,7 +112,7 @@ class RelayedDevice(BlenderDevice):
         self._passes: list[Future] = []
 
     def current(self) -> AbstractContextManager[BlenderDevice]:
-        """See Device. The main thread checks whether Blender's GPU is current."""
+        """Return a context in which passes run. The main thread checks whether Blender's GPU can be used."""
         return self._cleared()
 
     def _make(self, *arguments: Any) -> list:
@@ -129,7 +142,10 @@ class RelayedDevice(BlenderDevice):
         self._wait_for(lambda: BlenderDevice.release(self))
 
     def _wait_for(self, function: Callable[[], T]) -> T:
-        """Return the function's result on the main thread, after all passes."""
+        """Have the main thread call a function after all passes so far, wait, and return its result.
+
+        It raises what the function or one of the passes has raised.
+        """
         result = _called(function).result()
         passes, self._passes = self._passes, []
         for done in passes:
@@ -138,7 +154,7 @@ class RelayedDevice(BlenderDevice):
 
 
 def ask(function: Callable[[], None], seconds: float) -> None:
-    """Have the main thread call a function, and wait at most `seconds` for it. Then the call is cancelled."""
+    """Have the main thread call a function, and wait at most `seconds`. Then cancel the call if it has not begun."""
     asked = _called(function)
     try:
         asked.result(seconds)
@@ -147,10 +163,10 @@ def ask(function: Callable[[], None], seconds: float) -> None:
 
 
 def serve(seconds: float = _LEAST) -> bool:
-    """Make calls on the main thread for some seconds, while it waits for a thread that may call.
+    """Make the calls of other threads for some seconds, on the main thread, while that waits for one of these threads.
 
     Returns:
-        False: calls wait, but Blender's GPU is not current
+        False if calls wait that cannot be made, because Blender's GPU cannot be used yet.
     """
     if not has_context():
         _redraw()
@@ -170,7 +186,11 @@ def serve(seconds: float = _LEAST) -> bool:
 
 
 def _finish_some() -> None:
-    """Wait for passes after each batch, since drawing and reading have to wait for all passes before."""
+    """Count a pass, and after each batch wait until the GPU has finished it.
+
+    Otherwise passes would pile up, and Blender's drawing would have to wait for all of them. The batch's size adapts so
+    that it takes about _MOMENT seconds.
+    """
     _main.unfinished += 1
     if _main.unfinished >= _main.batch:
         start = time.monotonic()
@@ -180,7 +200,7 @@ def _finish_some() -> None:
 
 
 def _called(function: Callable[[], T]) -> Future[T]:
-    """Queue a call for the main thread. Return its future."""
+    """Queue a function for the main thread, and return the future of its result."""
     done: Future[T] = Future()
     _main.until = time.monotonic() + _REST
     _main.calls.put((done, function))
@@ -188,7 +208,13 @@ def _called(function: Callable[[], T]) -> Future[T]:
 
 
 def look() -> bool:
-    """Make calls on the main thread. Return whether it has to look again at once."""
+    """Make the calls that other threads wait for, on the main thread, for _LEAST to _MOST seconds.
+
+    Nothing is done if no call waits and none came lately.
+
+    Returns:
+        Whether to call this again at once.
+    """
     if _main.calls.empty() and time.monotonic() >= _main.until:
         return False
     serve(min(max(time.monotonic() - _main.looked, _LEAST), _MOST))
@@ -197,7 +223,7 @@ def look() -> bool:
 
 
 def _redraw() -> None:
-    """Redraw all windows, which makes Blender's GPU current."""
+    """Have all windows redrawn, so that Blender's GPU can be used again."""
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
             area.tag_redraw()

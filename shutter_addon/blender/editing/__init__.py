@@ -1,1 +1,1 @@
-"""Changes of effects: add, draw, key, copy, remove, restore."""
+"""Change effects: add, draw, key, copy and remove them, and keep them consistent with the strips."""

@@ -1,4 +1,4 @@
-"""Add an effect to a source strip: an effect strip above it, and an effect scene."""
+"""Add an effect to a source strip: make an effect strip above it, and the effect scene that this strip shows."""
 
 from __future__ import annotations
 
@@ -31,12 +31,17 @@ LOOK = {
 
 
 def add_effect(scene: Scene, source: Strip) -> tuple[Strip, PropertyGroup]:
-    """Add an effect to a movie, image or clip strip. The effect has no shutter yet.
+    """Add an effect, which has no shutter yet, to a movie, image or clip strip.
 
-    Return the effect strip, which lies above the source with its range, transform and crop, and the effect.
+    Args:
+        scene: The scene that has the strip.
+        source: The movie, image or clip strip.
+
+    Returns:
+        The new effect strip, which lies above the source with its range, transform and crop; and the effect.
 
     Raises:
-        MediaError: the source cannot be read.
+        MediaError: The source's footage cannot be read.
     """
     medium = _take(source)
     name = data_("Shutter {source}").format(source=source.name)
@@ -65,8 +70,11 @@ def add_effect(scene: Scene, source: Strip) -> tuple[Strip, PropertyGroup]:
 def choose_source(effect: PropertyGroup, strip: Strip, source: Strip) -> None:
     """Make an effect use another movie, image or clip strip as its source.
 
+    Args:
+        strip: The effect strip.
+
     Raises:
-        MediaError: the source cannot be read.
+        MediaError: The source's footage cannot be read.
     """
     _take(source)
     scene, effect.source = effect.id_data, source.virtual_shutter_source
@@ -77,10 +85,10 @@ def choose_source(effect: PropertyGroup, strip: Strip, source: Strip) -> None:
 
 
 def own_source(source: Strip, shown: list[Shown]) -> None:
-    """Give a source strip a unique identity, and update the effects that show it.
+    """Give a source strip a new, unique identity (a text), and store that in all effects that use the strip.
 
     Args:
-        shown: all effects that are shown.
+        shown: All effects with their strips and sources.
     """
     source.virtual_shutter_source = uuid.uuid4().hex
     for effect in [each.effect for each in shown if each.source == source]:
@@ -88,13 +96,15 @@ def own_source(source: Strip, shown: list[Shown]) -> None:
 
 
 def _take(source: Strip) -> FrameSource:
-    """Give a strip an identity as a source, and return its medium, closed.
+    """Make a strip the source of an effect: give it an identity, and mute it if it is transparent.
 
-    A transparent source is muted, because it would show behind the effect. An opaque one stays visible if the effect is
-    muted.
+    A transparent source would show behind the effect. An opaque one stays visible, for when the effect is muted.
+
+    Returns:
+        The footage, closed; its size and kind of alpha can still be read.
 
     Raises:
-        MediaError: the source cannot be read.
+        MediaError: The source's footage cannot be read.
     """
     medium = source_media.open_media(source)
     medium.close()
@@ -105,24 +115,25 @@ def _take(source: Strip) -> FrameSource:
 
 
 def connect(scene: Scene, connected: list[Strip]) -> None:
-    """Connect strips, so that they are selected and moved together. They leave their previous connections."""
+    """Connect strips to each other only, so that Blender selects and moves them together."""
     with selecting(scene, connected):
         bpy.ops.sequencer.connect(toggle=False)
 
 
 @contextmanager
 def selecting(scene: Scene, chosen: list[Strip]) -> Iterator[None]:
-    """Select strips for an operator that works on the selection, then restore the selection."""
+    """Select only these strips within a `with` block, for operators that work on the selection; then restore it."""
     selected = ((strip, "select", strip in chosen) for strip in scene.sequence_editor.strips_all)
     with for_a_while(selected), bpy.context.temp_override(sequencer_scene=scene):
         yield
 
 
 def copy_look(source: Strip, strip: Strip, *, keys: bool = False) -> None:
-    """Copy transform, crop, flip and color of a strip to another.
+    """Copy transform, crop, flip and color (LOOK) from one strip to another.
 
     Args:
-        keys: copy their F-curves as well.
+        source: The strip to copy from.
+        keys: Copy their F-curves as well.
     """
     for name in (name for names in LOOK.values() for name in names):
         for (old, prop), (new, _prop) in zip(settings(source, name), settings(strip, name), strict=True):
@@ -134,7 +145,7 @@ def copy_look(source: Strip, strip: Strip, *, keys: bool = False) -> None:
 
 
 def settings(strip: Strip, name: str) -> list[tuple[bpy_struct, str]]:
-    """Return owner and name of a strip's property, or of all properties of a group."""
+    """Return owner and name of each property that LOOK's entry `name` stands for: one, or all of a property group."""
     group = getattr(strip, name)
     if not isinstance(group, bpy_struct):
         return [(strip, name)]
@@ -142,7 +153,15 @@ def settings(strip: Strip, name: str) -> list[tuple[bpy_struct, str]]:
 
 
 def new_footage(level: StripsTopLevel, name: str, files: list[str], channel: int, start: int, is_movie: bool) -> Strip:
-    """Add a movie strip or an image sequence strip."""
+    """Add a strip of footage, and return it.
+
+    Args:
+        level: The strips of a scene or of a meta strip, to which it is added.
+        files: A movie, or the pictures of an image sequence in order.
+        channel: The strip's channel.
+        start: Timeline frame at which it starts.
+        is_movie: Whether `files` is a movie.
+    """
     if is_movie:
         return level.new_movie(name, files[0], channel, start)
     strip = level.new_image(name, files[0], channel, start)
@@ -152,7 +171,13 @@ def new_footage(level: StripsTopLevel, name: str, files: list[str], channel: int
 
 
 def new_effect_scene(scene: Scene, identity: str, name: str, size: tuple[int, int]) -> Scene:
-    """Add an effect scene with a camera and an empty annotation."""
+    """Add an effect scene, which the engine of this extension renders, with a camera and an empty annotation.
+
+    Args:
+        scene: The scene that will have the effect; gives the frame rate.
+        identity: Unique text, which effect, strip and effect scene store to find each other.
+        size: Width and height of the footage in pixels.
+    """
     effect_scene = bpy.data.scenes.new(name)
     effect_scene.virtual_shutter.identity = identity
     effect_scene.render.engine = ENGINE
@@ -169,7 +194,7 @@ def new_effect_scene(scene: Scene, identity: str, name: str, size: tuple[int, in
 
 
 def add_camera(scene: Scene) -> None:
-    """Add a camera. Without one, Blender renders a Scene strip empty without asking the engine."""
+    """Add a camera to an effect scene. Without one, Blender renders a Scene strip empty and never asks the engine."""
     name = f"{scene.name} Camera"
     camera = bpy.data.objects.new(name, bpy.data.cameras.new(name))
     camera.data.virtual_shutter_made = scene.virtual_shutter.identity

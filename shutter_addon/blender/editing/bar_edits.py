@@ -1,4 +1,4 @@
-"""Edit a shutter's bars: paint, key, and read them at the current frame."""
+"""Edit a shutter's bars (how much each frame of its window counts): set, key and unkey them, and read them."""
 
 from collections.abc import Sequence
 from contextlib import suppress
@@ -17,7 +17,12 @@ from ..rendering import effect_source, invalidation, sessions
 
 
 def summary(weights: np.ndarray, combine: str = "AVERAGE") -> str:
-    """Return a text about bars (L,): their angle and number of frames, or what they combine (choices.COMBINES)."""
+    """Return a text for the user about a shutter's bars, such as "180° (4 of 8 frames)".
+
+    Args:
+        weights: The bars (L,): how much each frame counts.
+        combine: An item of choices.COMBINES. Other than for "AVERAGE", the text says how many frames are combined.
+    """
     if not np.any(weights):
         return iface_("All bars are zero: the shutter never opens")
     if combine != "AVERAGE":
@@ -30,8 +35,13 @@ def summary(weights: np.ndarray, combine: str = "AVERAGE") -> str:
 
 
 def told(scene: Scene, effect: PropertyGroup, strip: Strip, weights: np.ndarray) -> str:
-    """Return a text about the active shutter's bars (L,): `summary`, or how many frames an exposure whose length varies
-    is open for at the current frame. The result is kept until something changes."""
+    """Return a text for the user about the active shutter's bars. It is kept until something changes.
+
+    If the exposure's length varies, it says how many frames are open at the current frame; otherwise it is `summary`.
+
+    Args:
+        weights: The bars (L,): how much each frame counts.
+    """
     index, frame = effect.active_shutter, scene.frame_current
     shutter = effect.shutters[index]
     has_length = shutter.length == "TIMELINE" or (shutter.follow != "NOTHING" and shutter.length == "MOTION")
@@ -45,22 +55,28 @@ def told(scene: Scene, effect: PropertyGroup, strip: Strip, weights: np.ndarray)
 
 
 def set_bars(shutter: PropertyGroup, weights: Sequence[float] | np.ndarray) -> None:
-    """Set the weights (L,) of a shutter's bars that differ."""
+    """Set the weights of a shutter's bars, except those that have the value already.
+
+    Args:
+        weights: (L,): how much each frame counts.
+    """
     for bar, weight in zip(shutter.bars, weights, strict=True):
         if bar.weight != np.float32(weight):
             bar.weight = weight
 
 
 def auto_key(context: Context) -> bool:
-    """Return whether Blender's Auto Keying is on."""
+    """Tell whether Blender's *Auto Keying* is on."""
     return context.scene.tool_settings.use_keyframe_insert_auto
 
 
 def paint(effect: PropertyGroup, index: int, weights: Sequence[float] | np.ndarray, key: bool = False) -> None:
-    """Set a shutter's bars (L,) at the current frame, changing their number if necessary.
+    """Set how many bars a shutter has, and their weights at the current frame.
 
     Args:
-        key: insert keyframes for them.
+        index: Of the shutter.
+        weights: (L,): how much each frame counts.
+        key: Insert keyframes for them.
     """
     shutter = effect.shutters[index]
     while len(shutter.bars) > len(weights):
@@ -73,7 +89,11 @@ def paint(effect: PropertyGroup, index: int, weights: Sequence[float] | np.ndarr
 
 
 def key_bars(effect: PropertyGroup, index: int) -> None:
-    """Insert keyframes for all bars of a shutter at the current frame."""
+    """Insert keyframes at the current frame for all bars of a shutter, with the values that the picture uses.
+
+    Args:
+        index: Of the shutter.
+    """
     # Between keys, the values of F-curves differ from the bars that the picture uses.
     shutter, scene = effect.shutters[index], effect.id_data
     set_bars(shutter, bars_now(effect, index))
@@ -83,13 +103,13 @@ def key_bars(effect: PropertyGroup, index: int) -> None:
 
 
 def _paths(effect: PropertyGroup, index: int) -> list[str]:
-    """Return the data paths of a shutter's weights, from the scene."""
+    """Return the data path, from the scene, of the weight of each of a shutter's bars."""
     path = f"{effect.path_from_id()}.shutters[{index}].bars"
     return [f"{path}[{k}].weight" for k in range(len(effect.shutters[index].bars))]
 
 
 def unkey_bars(effect: PropertyGroup, index: int) -> bool:
-    """Delete the keyframes of a shutter's bars at the current frame. Return whether there were any."""
+    """Delete the keyframes that a shutter's bars have at the current frame. Return whether there were any."""
     scene = effect.id_data
     curves, is_deleted = fcurves.Curves(scene), False
     for path in filter(curves.find, _paths(effect, index)):
@@ -99,13 +119,19 @@ def unkey_bars(effect: PropertyGroup, index: int) -> bool:
 
 
 def shown(effect: PropertyGroup, index: int) -> tuple[np.ndarray, list[str]]:
-    """Return bars (L,) and key states for drawing code. The result is kept until something changes."""
+    """Return what the bar editor draws of a shutter at the current frame: bars (L,) and their states (key_state).
+
+    It is kept until something changes.
+    """
     key = effect.scene.session_uid, index, effect.id_data.frame_float
     return revision.until_change("bars", key, lambda: _read(effect, index))
 
 
 def key_state(effect: PropertyGroup, index: int) -> list[str]:
-    """Return the state of each bar, as Blender colors fields: "", "animated", "keyed" or "changed"."""
+    """Return for each of a shutter's bars how Blender would color its field: "", "animated", "keyed" or "changed".
+
+    "changed" is a value that differs from that of its F-curve, and is not keyed yet.
+    """
     scene = effect.id_data
     curves = fcurves.Curves(scene)
     bars_and_paths = zip(effect.shutters[index].bars, _paths(effect, index), strict=True)
@@ -122,12 +148,15 @@ def _state(curve: FCurve | None, value: float, scene: Scene) -> str:
 
 
 def bars_now(effect: PropertyGroup, index: int) -> np.ndarray:
-    """Return the bars (L,) of the picture at the current frame, interpolated between keyframes.
+    """Return how much each frame counts for a shutter (its bars, (L,)) in the picture at the current frame.
 
-    Bars that were changed and not keyed yet count as they are.
+    Between keyframes, bars are interpolated. Bars that were changed and not keyed yet are returned as stored.
+
+    Args:
+        index: Of the shutter.
 
     Raises:
-        EffectError: the picture is impossible.
+        EffectError: A bar is out of range, or they are not as many as the window is long.
     """
     return _read(effect, index)[0]
 

@@ -1,6 +1,7 @@
 """Compare an effect strip with its source, and match it on request: transform, crop, flip, color and range.
 
-Strokes keep their place on the picture. What can only be wrong is corrected automatically by reconcile.follow_sources.
+Strokes keep their place on the picture. What can only be a mistake is corrected without asking, by
+reconcile.follow_sources.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from . import add_effect
 
 
 def strip_and_source(effect: PropertyGroup) -> list[Strip]:
-    """Return the strip of an effect and its source; []: one of them is missing."""
+    """Return [effect strip, source strip] of an effect; []: one of them is missing."""
     shown = strips.with_sources(effect.id_data)
     return next(([each.strip, each.source] for each in shown if each.effect == effect), [])
 
@@ -33,10 +34,10 @@ class Shown(NamedTuple):
     """What panels show about an effect's source.
 
     Attributes:
-        source: its name.
-        differences: labels of what `match` would change.
-        lacks_modifiers: the source has modifiers that the effect strip lacks.
-        has_effects: the source has effect strips.
+        source: The source strip's name.
+        differences: Labels of what `match` would change.
+        lacks_modifiers: Whether the source has modifiers that the effect strip lacks.
+        has_effects: Whether strips such as Glow or Speed Control use the source.
     """
 
     source: str
@@ -46,7 +47,7 @@ class Shown(NamedTuple):
 
 
 def shown(effect: PropertyGroup) -> Shown | None:
-    """Return what panels show about the source, kept until something changes; None: there is no source."""
+    """Return what panels show about an effect's source, kept until something changes; None: there is none."""
     return revision.until_change("source", effect.scene.session_uid, lambda: _compare(effect))
 
 
@@ -65,9 +66,10 @@ def _compare(effect: PropertyGroup) -> Shown | None:
 
 
 def match(effect: PropertyGroup) -> Strip | None:
-    """Give the effect strip the look and range of its source.
+    """Give the effect strip the look and the range of its source.
 
-    Return the neighboring strip that limits the range, or None.
+    Returns:
+        The neighboring strip that keeps the range smaller than the source's; None: nothing does.
     """
     scene, (strip, source) = effect.id_data, strip_and_source(effect)
     with scribbles_kept(effect, strip):
@@ -80,7 +82,10 @@ def match(effect: PropertyGroup) -> Strip | None:
 
 
 def _looks(strip: Strip) -> dict[str, str]:
-    """Return values and keyframes of each part of a strip's look, as text so that NaN equals NaN."""
+    """Return the values and keyframes of each part of a strip's look (add_effect.LOOK), to be compared.
+
+    They are texts, because NaN never equals NaN.
+    """
     path = f"{strip.path_from_id()}."
     curves = [curve for curve in fcurves.curves_under(strip.id_data, path) if not curve.mute]
     return {
@@ -104,10 +109,10 @@ def _keyed(curves: list[FCurve], path: str) -> list:
 
 
 def _goal(effect: PropertyGroup, strip: Strip, source: Strip) -> tuple[int, int, Strip | None]:
-    """Return the handles that an effect strip would get, and the neighboring strip that limits them or None.
+    """Return the handles that `match` would give an effect strip, and the neighboring strip that limits them, or None.
 
-    They are those of the source, or of the parts that it was cut into. An edge where another effect of the same source
-    continues stays. Without any room, both handles stay.
+    They are those of the source, or of all parts that it was cut into below the strip. Where another effect strip uses
+    the same source beyond an edge, that edge stays. Without any room, both stay.
     """
     parts = (s for s in effect.id_data.sequence_editor.strips_all if s.virtual_shutter_source == effect.source)
     parts = (s for s in parts if s.type == source.type and strips.origin(s) == strips.origin(source))
@@ -128,9 +133,14 @@ def _goal(effect: PropertyGroup, strip: Strip, source: Strip) -> tuple[int, int,
 
 
 def _slip(scene: Scene, strip: Strip, source: Strip, left: int, right: int) -> None:
-    """Slip the effect's content and its keyframes with a source that moved as a whole, or that begins before it.
+    """Slip the content and the keyframes of an effect strip together with its source.
 
-    Before its content begins, an effect strip shows only its first frame.
+    This is done if the source moved as a whole, or begins before the effect's content. An effect strip would show only
+    its first frame before its content begins.
+
+    Args:
+        left: Left handle that the strip will get.
+        right: Right handle that the strip will get.
     """
     frames = int(source.content_start - strip.content_start)
     moved = frames == left - strip.left_handle == right - strip.right_handle
@@ -141,14 +151,17 @@ def _slip(scene: Scene, strip: Strip, source: Strip, left: int, right: int) -> N
 
 @contextmanager
 def scribbles_kept(effect: PropertyGroup, strip: Strip) -> Iterator[None]:
-    """Keep strokes on the effect's picture while the picture moves."""
+    """Keep strokes in their place on the effect's picture while a `with` block moves or resizes the picture."""
     before = places(effect, strip)
     yield
     put_back(effect, strip, before)
 
 
 def places(effect: PropertyGroup, strip: Strip) -> list[np.ndarray | None]:
-    """Return the matrix from image to picture for each drawing; None: the picture has no size or place there."""
+    """Return, for each drawing of an effect, the matrix (3, 3) from the sequencer's image to the picture at its frame.
+
+    None in place of a matrix: the picture is too small there, or its transform is not finite.
+    """
     frames = [drawing.frame_number for drawing in _drawings(effect)]
     placement = sampled.Sampling.of(effect.id_data, effect, strip, frames).placement
     found = [sampled.tried(placement.at, frame) for frame in frames]
@@ -156,10 +169,10 @@ def places(effect: PropertyGroup, strip: Strip) -> list[np.ndarray | None]:
 
 
 def put_back(effect: PropertyGroup, strip: Strip, before: list[np.ndarray | None]) -> None:
-    """Move an effect's drawings back to their place on the picture.
+    """Move an effect's strokes so that they are where they were on the picture, after the picture was moved.
 
     Args:
-        before: result of `places` before the change.
+        before: What `places` returned before that.
     """
     for drawing, old, new in zip(_drawings(effect), before, places(effect, strip), strict=True):
         if old is not None and new is not None and not np.array_equal(old, new):
@@ -176,7 +189,7 @@ def _drawings(effect: PropertyGroup) -> list[AnnotationFrame]:
 
 
 def append_modifiers(scene: Scene, source: Strip, part: Strip) -> None:
-    """Copy the modifiers of a strip to another, with their keyframes."""
+    """Copy all modifiers of the strip `source`, with their keyframes, to the end of those of the strip `part`."""
     if not source.modifiers:
         return
     count = len(part.modifiers)
@@ -188,6 +201,6 @@ def append_modifiers(scene: Scene, source: Strip, part: Strip) -> None:
 
 
 def effects_on(scene: Scene, source: Strip) -> list[Strip]:
-    """Return the effect strips that have a source as input. The engine does not see their result."""
+    """Return the strips, such as Glow, that have a source as input. Our engine does not see their result."""
     inputs = ("input_1", "input_2")
     return [s for s in scene.sequence_editor.strips_all if any(getattr(s, name, None) == source for name in inputs)]

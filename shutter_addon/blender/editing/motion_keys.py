@@ -1,10 +1,10 @@
-"""Keyframes of a region's or the camera's motion: those that tracking made, and the user's, which correct them.
+"""Keyframes of the motion of a region or the camera: those that tracking made, and the user's, which correct them.
 
 Tracking makes keyframes of Blender's type Generated, which has its own color, and stores their value in them. All
 others are the user's: they keep frame and value, and become linear before a generated one.
 
-A keyframe that the user inserts bends its surroundings until tracking begins at it. Then frames that are not tracked
-again get their tracked place back.
+A keyframe that the user inserts bends its surroundings until tracking begins at it. Then the frames that are not
+tracked again get the position back that tracking had found there.
 """
 
 import math
@@ -41,10 +41,11 @@ _STEADY = 0.25  # pixels by which keyframes of the camera may be off, since it m
 
 @dataclass(frozen=True)
 class MotionKeys:
-    """The keyframes of a motion (choices.MOTIONS) of a region or the camera. Frames are timeline frames.
+    """Reads and writes the keyframes of a region's or the camera's motion. Frames are timeline frames.
 
     Attributes:
-        index: see selection.moving.
+        index: Of the region; None: the camera.
+        motion: Which properties tracking keys, an item of choices.MOTIONS: location, with rotation, or also with scale.
     """
 
     effect: bpy.types.PropertyGroup
@@ -52,35 +53,41 @@ class MotionKeys:
     motion: str
 
     def edited(self, frames: range) -> list[int]:
-        """Return the whole frames, among these, with a user's keyframe."""
+        """Return those of these frames that have a keyframe of the user's, ascending."""
         keys = map(_read, self._curves(_COUNTS[self.motion]))
         keyed = {frame for all_frames, made in keys for frame in all_frames[~made].tolist()}
         return sorted(int(frame) for frame in keyed if frame in frames)
 
     def are_made(self) -> bool:
-        """Return whether tracking made any keyframe of the location."""
+        """Tell whether tracking made any keyframe of the location."""
         curve = self._curve("location")
         return curve is not None and bool(_read(curve)[1].any())
 
     def reach(self, frame: int) -> bool:
-        """Return whether the motion has keyframes, and tracking, if it made any, reached a frame.
+        """Tell whether the motion is known at a frame.
 
-        A single keyframe does not count, because nothing moves.
+        It is if it has several keyframes, and tracking, if it was used, found a position at the frame. A single
+        keyframe does not count, because nothing moves.
         """
         tracked = self.confidence()[0]
         are_several = any(len(curve.keyframe_points) > 1 for curve in self._curves(_COUNTS[self.motion]))
         return are_several and (not len(tracked) or frame in tracked)
 
     def channels(self) -> list[str]:
-        """Return the channels of the motion, and those that have keyframes already."""
+        """Return the names of the properties to key: those of `motion`, and others that have keyframes already."""
         count = _COUNTS[self.motion]
         names = (name for k, (name, component) in enumerate(_COMPONENTS) if k < count or self._curve(name, component))
         return list(dict.fromkeys(names))
 
     def hold(self, first: int, last: int) -> None:
-        """Key what was tracked right before and after these frames, so that changes between do not move it.
+        """Insert keyframes right before and right after some frames where tracking had found positions, with these.
 
-        It does not matter if the user has moved the first and last frame since.
+        So changes of the keyframes between do not move what is outside. Positions are as tracking found them, even if
+        the user has changed the first or the last keyframe since.
+
+        Args:
+            first: First of the frames that will change.
+            last: Last of them.
         """
         tracked = self.confidence()[0]
         beside = tracked[np.isin(tracked, (first - 1, last + 1))].tolist()
@@ -89,23 +96,24 @@ class MotionKeys:
                 _insert(curve, frame, value)
 
     def begin(self, frame: int) -> None:
-        """Make the scene's current frame, where tracking begins, a user's keyframe, and keep what was tracked beside
-        it.
+        """Insert a keyframe of the user's at the scene's current frame, from which tracking will start.
+
+        What tracking had found right before and after stays (`hold`).
 
         Raises:
-            EffectError: see check_curves.
+            EffectError: As in check_curves.
         """
         self.hold(frame, frame)
         insert(self.effect, self.index, self.channels(), begins=True)
 
     def write(self, placements: Mapping[int, Placement], confidence: Mapping[int, float]) -> None:
-        """Replace the keyframes that tracking made at the frames that have a confidence.
+        """Replace the keyframes that tracking made, at the frames that were tracked now.
 
         Other tracked frames stay. Frames between them that were never tracked get a confidence of 0.
 
         Args:
-            placements: the new keyframes, at some of these frames.
-            confidence: 0 to 1, by frame.
+            placements: Location, rotation and scale for each new keyframe, at some of the tracked frames.
+            confidence: How sure tracking is, 0 to 1, for all tracked frames.
         """
         for first, last in frame_ranges.runs(confidence):
             self.hold(first, last)
@@ -120,11 +128,14 @@ class MotionKeys:
         _replace(self._curve("confidence", new=True), every, every)
 
     def needed(self, shape: Region | Camera, start: int, placements: Placements, kept: Collection[int]) -> list[int]:
-        """Return the frames whose keyframes reproduce the motion within a pixel, or _STEADY.
+        """Return the frames whose keyframes reproduce a tracked motion within a pixel, or _STEADY for the camera.
 
         Args:
-            start: frame whose drawing of a region counts.
-            kept: frames to return in any case.
+            shape: The region or camera as plain data; the motion is compared at its strokes, or at the picture's
+                corners.
+            start: Timeline frame whose drawing of the region is compared.
+            placements: The tracked motion, by timeline frame.
+            kept: Frames to return in any case.
         """
         size = annotations.picture_size(self.effect)
         if isinstance(shape, Camera):
@@ -132,13 +143,20 @@ class MotionKeys:
         return motions.thinned(placements, motions.offsets(shape.drawings.at(start)), size, kept)
 
     def confidence(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the frames (n,) with a confidence, ascending, and the confidence (n,), 0 to 1."""
+        """Return the tracked frames (n,), ascending, and how sure tracking was at each (n,), 0 to 1."""
         curve = self._curve("confidence")
         points = curve.points() if curve else np.empty((0, 2))
         return points[:, 0], points[:, 1] / 100
 
     def fade(self, name: str, keys: Iterable[presence.Key]) -> None:
-        """Replace the keyframes that tracking made for a property from 0 to 1. Between them the user's value counts."""
+        """Replace the keyframes that tracking made to fade the opacity or influence out where the track ends.
+
+        Where tracking makes no keyframe, the value is the user's.
+
+        Args:
+            name: Property from 0 to 1, one of ENDS.
+            keys: The new keyframes; values are shares of the user's value.
+        """
         curve = self._curve(name, new=True)
         moving, path = selection.moving(self.effect, self.index), curve.data_path
         points, (frames, made) = curve.keyframe_points, _read(curve)
@@ -158,7 +176,7 @@ class MotionKeys:
             setattr(moving, name, whole)
 
     def _curves(self, count: int = len(_COMPONENTS)) -> list[fcurves.Timed]:
-        """Return the F-curves of the first components that have one."""
+        """Return the existing F-curves among the first `count` of _COMPONENTS."""
         found = (self._curve(name, component) for name, component in _COMPONENTS[:count])
         return [curve for curve in found if curve is not None]
 
@@ -172,10 +190,13 @@ class MotionKeys:
 
 
 def check_curves(effect: PropertyGroup, index: int | None) -> None:
-    """Check that a region or the camera can be keyed.
+    """Check that F-curves of a region's or the camera's motion can be changed.
+
+    Args:
+        index: Of the region; None: the camera.
 
     Raises:
-        EffectError: an F-curve is locked or muted.
+        EffectError: One is locked or muted.
     """
     moving = selection.moving(effect, index)
     for name in (*CHANNELS, "confidence", ENDS[index is None]):
@@ -188,15 +209,16 @@ def check_curves(effect: PropertyGroup, index: int | None) -> None:
 
 
 def insert(effect: PropertyGroup, index: int | None, names: Sequence[str] = CHANNELS, *, begins: bool = False) -> None:
-    """Key channels of a region or the camera at the scene's current frame, as the user's keyframes with full
-    confidence.
+    """Insert keyframes of the user's for a region or the camera at the scene's current frame. Their confidence is full.
 
     Args:
-        begins: tracking begins here, so that its frame counts. Other keyframes on a stretched timeline lie where
-            Blender's own do. They store what was tracked there for MotionKeys.hold.
+        index: Of the region; None: the camera.
+        names: Properties to key.
+        begins: Tracking will start here, so the keyframes lie on a frame that can be tracked. Otherwise, on a stretched
+            timeline, they lie where Blender's own would. They then store what tracking had found, for MotionKeys.hold.
 
     Raises:
-        EffectError: see check_curves.
+        EffectError: As in check_curves.
     """
     check_curves(effect, index)
     scene, moving = effect.id_data, selection.moving(effect, index)
@@ -226,7 +248,7 @@ def _keys_at(curve: fcurves.Timed, frame: float) -> list:
 
 
 def _tracked_value(curve: fcurves.Timed, frame: float) -> float:
-    """Return what tracking found at a frame, for a user's keyframe there."""
+    """Return the value that tracking had found at a frame. A user's keyframe that is inserted there stores it."""
     for key in _keys_at(curve, frame):
         if key.type != MADE:
             return key.back
@@ -234,9 +256,12 @@ def _tracked_value(curve: fcurves.Timed, frame: float) -> float:
 
 
 def _as_tracked(curve: fcurves.Timed, edited: tuple[int, int], frames: list[float]) -> dict[float, float]:
-    """Return tracked values at frames without a keyframe, interpolated linearly.
+    """Return the values that tracking had found at some frames without a keyframe, interpolated linearly.
 
-    The two edited frames count as tracked once more, and then forget it.
+    Args:
+        edited: Two frames whose keyframes may be the user's. What tracking had found there is used, then removed from
+            them.
+        frames: The frames to return values for; those with a keyframe are left out.
     """
     points = curve.points()
     for i in np.flatnonzero(np.isin(points[:, 0], edited)).tolist():
@@ -248,13 +273,20 @@ def _as_tracked(curve: fcurves.Timed, edited: tuple[int, int], frames: list[floa
 
 
 def _values(placement: Placement) -> tuple[float, ...]:
-    """Return a placement in the order of _COMPONENTS and in Blender's units, rounded to _DIGITS of a recipe's."""
+    """Return a placement's numbers in the order of _COMPONENTS, rotation in radians, rounded to _DIGITS digits."""
     x, y, rotation, scale = np.round(motions.as_array([placement])[0], _DIGITS).tolist()
     return x, y, math.radians(rotation), scale
 
 
 def _replace(curve: fcurves.Timed, values: dict[int, float], tracked: Iterable[int]) -> None:
-    """Replace the generated keyframes of the tracked frames with these values by frame."""
+    """Replace the generated keyframes of an F-curve at the tracked frames.
+
+    The user's keyframes stay, and become linear where generated ones follow.
+
+    Args:
+        values: The new keyframes' values by frame.
+        tracked: All frames that were tracked.
+    """
     points, (frames, made) = curve.keyframe_points, _read(curve)
     within = np.isin(frames, list(tracked))
     edited = within & ~made
@@ -274,7 +306,7 @@ def _insert(curve: fcurves.Timed, frame: float, value: float, ease: str = "LINEA
 
 
 def _read(curve: fcurves.Timed) -> tuple[np.ndarray, np.ndarray]:
-    """Return the frames (n,) of an F-curve's keyframes, and which of them are generated and unchanged."""
+    """Return an F-curve's keyframes: their frames (n,), and whether tracking made each and nobody changed it (n,)."""
     points = curve.points()
     types = fcurves.numbers(curve.keyframe_points, "type", np.int32)
     kept = fcurves.numbers(curve.keyframe_points, "back")

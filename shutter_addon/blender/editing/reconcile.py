@@ -1,4 +1,4 @@
-"""Update scenes, effects and annotations after strips were deleted, pasted, cut, moved, copied, or changed by undo.
+"""Make effects, scenes and annotations fit the strips again: after deleting, pasting, cutting, moving, copying, undo.
 
 Afterwards these hold, and a second call changes nothing:
 
@@ -35,10 +35,12 @@ _OF_EDIT = "fps", "fps_base", "use_multiview"
 
 
 def update(updated: Scene | None = None) -> None:
-    """Update everything after a change of the edit. Data of a newer version is not changed.
+    """Do all that this module does after a change of the edit, and have frames of changed effects made again.
+
+    Data of a newer version is not changed.
 
     Args:
-        updated: scene whose depsgraph is being updated, which must not be removed now.
+        updated: Scene whose depsgraph is being updated, which must not be removed now.
     """
     if bpy.app.is_job_running("RENDER"):
         return
@@ -51,7 +53,14 @@ def update(updated: Scene | None = None) -> None:
 
 
 def tidy(updated: Scene | None = None) -> list[strips.Shown]:
-    """Do everything except follow_sources, which reads media. Return what is shown then."""
+    """Do all but follow_sources, which reads footage.
+
+    Args:
+        updated: Scene whose depsgraph is being updated, which must not be removed now.
+
+    Returns:
+        The effects that strips show afterwards.
+    """
     scenes = _oldest_first(strips.local_scenes())
     _find_scenes(scenes)
     _mend(scenes)
@@ -72,19 +81,19 @@ def tidy(updated: Scene | None = None) -> list[strips.Shown]:
 
 
 def gather() -> list[strips.Shown]:
-    """Return the effects that editable scenes show."""
+    """Return all effects that strips show, in scenes that can be changed, with strip and source."""
     return [each for scene in strips.local_scenes() for each in strips.shown_effects(scene)]
 
 
 def forget() -> None:
-    """Forget annotations and media of a file before another one is loaded."""
+    """Forget what is kept of a file's annotations and footage, before another file is loaded."""
     _header.cache_clear()
     shown_annotations.forget()
     undelete.forget_copy()
 
 
 def find_lost() -> None:
-    """Restore pointers after undo.
+    """Restore pointers to effect scenes and actions after undo.
 
     Blender reads a changed scene into new memory, and pointers in there then point to the scene itself. The memory may
     be that of data which the undone step removed: of effect scenes, and of actions (_renew_action).
@@ -96,7 +105,10 @@ def find_lost() -> None:
 
 
 def _find_action(scene: Scene) -> None:
-    """Restore the pointer to the action. If the user had removed the action, no slot handle would be left."""
+    """Restore a scene's pointer to its action, by the slot that it used.
+
+    A scene whose action the user removed has no slot handle, and is left alone.
+    """
     animation = scene.animation_data
     if animation is None or animation.action is not None or not animation.action_slot_handle:
         return
@@ -108,7 +120,7 @@ def _find_action(scene: Scene) -> None:
 
 
 def _find_scenes(scenes: list[Scene]) -> None:
-    """Restore pointers of effects and strips to their effect scene by its identity, also after pasting."""
+    """Restore pointers of effects and strips to their effect scene, by the identity that all three store."""
     known = {scene.virtual_shutter.identity: scene for scene in reversed(_oldest_first(_effect_scenes()))}
     for scene in scenes:
         for effect in scene.virtual_shutter.effects:
@@ -121,7 +133,7 @@ def _find_scenes(scenes: list[Scene]) -> None:
 
 
 def _mend(scenes: list[Scene]) -> None:
-    """Restore what an effect scene needs to be rendered, such as its camera and engine."""
+    """Restore what effect scenes need to be rendered: camera, engine and other settings (requirements.settings)."""
     for strip in [strip for scene in scenes for strip in strips.own_strips(scene)]:
         if strip.scene is not None and strip.scene.library is None:
             for owner, name, value in requirements.settings(strip):
@@ -131,13 +143,13 @@ def _mend(scenes: list[Scene]) -> None:
 
 
 def _give(owner: bpy_struct, name: str, value: object) -> None:
-    """Set a property only if it differs, because Blender counts any assignment as a change."""
+    """Set a property only if its value differs, because Blender counts any assignment as a change."""
     if getattr(owner, name) != value:
         setattr(owner, name, value)
 
 
 def _bring_back(scenes: list[Scene]) -> None:
-    """Restore the effects of pasted strips. Blender's clipboard has strips without the scenes that they show."""
+    """Restore the effects of pasted strips. Blender's clipboard has Scene strips without the scenes that they show."""
     lost = [strip for scene in scenes for strip in strips.own_strips(scene) if strip.scene is None]
     if lost:
         _remove_left()  # remains of their removed scenes
@@ -147,7 +159,7 @@ def _bring_back(scenes: list[Scene]) -> None:
 
 
 def _oldest_first(scenes: list[Scene]) -> list[Scene]:
-    """Sort scenes so that copies follow their original, which then stays unchanged.
+    """Return the scenes sorted by age, so that copies come after their original, which then stays unchanged.
 
     Undo assumes that a scene which the last step did not change is unchanged.
     """
@@ -155,7 +167,7 @@ def _oldest_first(scenes: list[Scene]) -> list[Scene]:
 
 
 def _separate(scenes: list[Scene]) -> None:
-    """Give a copied edit its own action. Blender lets both share one."""
+    """Give copied edits an action of their own. Blender lets a copy share the original's."""
     taken = set()
     for animation in [scene.animation_data for scene in scenes if scene.virtual_shutter.effects]:
         if animation and animation.action:
@@ -165,7 +177,7 @@ def _separate(scenes: list[Scene]) -> None:
 
 
 def _adopt(scenes: list[Scene]) -> None:
-    """Give effect strips that were copied, cut or pasted from another scene their own effect scene and effect."""
+    """Give strips that were copied, cut or pasted their own effect scene and effect, in place of the original's."""
     taken = set()
     for scene in scenes:
         for strip in sorted(strips.effect_strips(scene), key=_place):
@@ -182,13 +194,16 @@ def _adopt(scenes: list[Scene]) -> None:
 
 
 def _place(strip: Strip) -> tuple[bool, int, int]:
-    """Return a sort key: of strips with the same effect, the first one that begins at its keyframes keeps it."""
+    """Return a sort key for effect strips that show the same effect. The first in this order keeps the effect.
+
+    It is the strip whose content begins where the effect's does, else the first on the timeline. The others get copies.
+    """
     effect = strips.effect_of(strip.id_data, strip.scene)
     return effect is None or strips.origin(strip) != effect.start, strip.left_handle, strip.channel
 
 
 def _original(scene: Scene, effect_scene: Scene) -> PropertyGroup | None:
-    """Return the effect whose effect scene was copied; look in `scene` first, then in other scenes.
+    """Return the effect whose effect scene was copied. Look in `scene` first, then in other scenes.
 
     Args:
         scene: The scene with the strip that shows the copy.
@@ -204,7 +219,7 @@ def _original(scene: Scene, effect_scene: Scene) -> PropertyGroup | None:
 
 
 def _duplicate(effect: PropertyGroup, strip: Strip, effect_scene: Scene) -> None:
-    """Give a strip and its scene a copy of an effect."""
+    """Give a strip a copy of an effect, and make the copy and the strip use `effect_scene`."""
     scene, old_scene, path = strip.id_data, effect.id_data, effect.path_from_id()
     new = data_format.new_effect(scene, old_scene.virtual_shutter.format)
     old = old_scene.path_resolve(path)  # looked up again, because adding to a collection moves its items
@@ -216,7 +231,7 @@ def _duplicate(effect: PropertyGroup, strip: Strip, effect_scene: Scene) -> None
 
 
 def _remove_effects(scene: Scene) -> None:
-    """Remove effects of a scene that no strip shows. undelete.restore can bring them back."""
+    """Remove effects of a scene that no strip shows any more. They are kept for undelete.restore."""
     group, shown = scene.virtual_shutter, {strip.scene for strip in strips.effect_strips(scene)}
     gone = [i for i, effect in enumerate(group.effects) if effect.scene not in shown]
     if gone:
@@ -227,7 +242,7 @@ def _remove_effects(scene: Scene) -> None:
 
 
 def _renew_action(scene: Scene) -> None:
-    """Replace a scene's action by a copy, for a handler to change.
+    """Replace a scene's action by a copy, before a handler changes it.
 
     Handlers run after the undo push of the user's step. Undo keeps data that is equal in both steps in its current
     state, with the handler's changes. The copy is in neither step, so undo restores the action.
@@ -243,7 +258,7 @@ def _renew_action(scene: Scene) -> None:
 
 
 def _effect_scenes() -> list[Scene]:
-    """Return the editable scenes that were made for effects."""
+    """Return the scenes that were made for effects and can be changed."""
     made = [scene for scene in strips.local_scenes() if scene.virtual_shutter.identity]
     return [scene for scene in made if scene.render.engine == strips.ENGINE]
 
@@ -253,7 +268,7 @@ def _effect_strips() -> list[Strip]:
 
 
 def _identify(shown: list[strips.Shown]) -> None:
-    """Give every effect scene a unique identity and its own annotation, and its strip and effect the same identity."""
+    """Give each effect scene a unique identity, which its strip and effect get, too, and an annotation of its own."""
     identities, drawn = set(), set()
     for scene in _oldest_first(_effect_scenes()):
         group = scene.virtual_shutter
@@ -273,7 +288,7 @@ def _identify(shown: list[strips.Shown]) -> None:
 
 
 def _follow_strips(shown: list[strips.Shown]) -> None:
-    """Move keyframes and drawings with their strips."""
+    """Move keyframes and drawings of effects along with strips that were moved in time."""
     for effect, strip, _source in shown:
         start = strips.origin(strip)
         if not abs(effect.start) <= 2 * MAX_FRAME:  # not a valid frame: leave the keyframes
@@ -286,9 +301,9 @@ def _follow_strips(shown: list[strips.Shown]) -> None:
 
 
 def _move_drawings(effect: PropertyGroup, start: float) -> None:
-    """Move drawings from the start that their annotation stores to the effect's start.
+    """Move drawings of an effect in time, from the start frame that their annotation stores, to `start`.
 
-    Undo may restore the effect's start without the annotation, which a handler moved.
+    The annotation stores it because undo may restore the effect without the annotation, which a handler moved.
     """
     annotation = effect.scene.annotation
     if annotation is None or annotation.library is not None:
@@ -304,7 +319,7 @@ def _move_drawings(effect: PropertyGroup, start: float) -> None:
 
 
 def _part_sources(shown: list[strips.Shown]) -> None:
-    """Give each source its own identity where effects of one identity show different strips: copies or cut parts."""
+    """Give source strips identities of their own where effects use different ones with the same: copies, cut parts."""
     first: dict[tuple[Scene, str], Strip] = {}
     for effect, strip, source in shown:
         if source and first.setdefault((strip.id_data, effect.source), source) != source:
@@ -312,7 +327,7 @@ def _part_sources(shown: list[strips.Shown]) -> None:
 
 
 def _unmute_sources(scenes: list[Scene], shown: list[strips.Shown]) -> None:
-    """Unmute sources that an effect muted and that no effect strip shows any more."""
+    """Unmute sources that were muted for an effect and that no effect strip uses any more."""
     sources = {each.source for each in shown}
     for strip in [strip for scene in scenes for strip in strips.all_strips(scene) if strip.virtual_shutter_muted]:
         if strip not in sources and not _is_baked_over(strip):
@@ -320,13 +335,13 @@ def _unmute_sources(scenes: list[Scene], shown: list[strips.Shown]) -> None:
 
 
 def _is_baked_over(source: Strip) -> bool:
-    """Return whether a baked film of a source lies above it. The source would show through transparent parts."""
+    """Tell whether a baked strip lies above a source, which would show through its transparent parts."""
     baked = (s for s in source.connections if s.type in strips.SOURCES and s.channel > source.channel)
     return any(s.virtual_shutter_bake.identity and strips.overlap(s, source) for s in baked)
 
 
 def _follow_names(shown: list[strips.Shown]) -> None:
-    """Give regions the new name of a drawing, which is a layer of the effect's annotation.
+    """Enter the new name of a renamed annotation layer in the regions that use it.
 
     An effect stores the names that its regions know, so that undo restores both together, with or without the
     annotation.
@@ -346,7 +361,11 @@ def _follow_names(shown: list[strips.Shown]) -> None:
 
 
 def _remove_scenes(updated: Scene | None) -> None:
-    """Remove effect scenes that no strip and no window shows."""
+    """Remove effect scenes that neither a strip nor a window shows.
+
+    Args:
+        updated: Scene whose depsgraph is being updated, which must not be removed now.
+    """
     stay = {strip.scene for strip in _effect_strips()} | {updated}
     for window in [window for manager in bpy.data.window_managers for window in manager.windows]:
         stay.update((window.scene, window.workspace.sequencer_scene))
@@ -357,7 +376,7 @@ def _remove_scenes(updated: Scene | None) -> None:
 
 
 def _remove_left() -> None:
-    """Remove annotations and cameras of removed effects. Those that are used elsewhere become the user's."""
+    """Remove annotations and cameras of removed effects. Those that something else uses become the user's own."""
     scenes = _effect_scenes()
     used = {scene.annotation for scene in scenes} | {scene.camera.data for scene in scenes if scene.camera}
     identities = {scene.virtual_shutter.identity for scene in bpy.data.scenes}
@@ -375,7 +394,11 @@ def _remove_left() -> None:
 
 
 def follow_sources(shown: list[strips.Shown]) -> None:
-    """Update effect scenes: rate and views of their edit, size of their source, and how Blender blends their strips."""
+    """Update effect scenes: frame rate and views of the edit, size of the source, and how Blender blends the strips.
+
+    Args:
+        shown: The effects with their strips and sources.
+    """
     for strip in _effect_strips():
         if strip.scene.library is None:
             for name in _OF_EDIT:
@@ -407,10 +430,11 @@ def _follow_mixing(strip: Strip, source: Strip, *, is_encoded: bool) -> None:
 
 @lru_cache(256)
 def _header(spec: source_media.SourceSpec) -> tuple[tuple[int, int], bool] | None:
-    """Return the size of a medium, limited to that of scenes, and whether Blender blends its display values instead of
-    light.
+    """Open footage once, and return what effect scenes need to know of it; None: it cannot be read.
 
-    None: it cannot be read. It is not opened again and again.
+    Returns:
+        Width and height in pixels, limited to what a scene can have, and whether Blender blends its display values
+        instead of light.
     """
     with suppress(MediaError):
         medium = open_source(spec.path, files=spec.files, **spec.options | {"colorspace": None})

@@ -1,6 +1,6 @@
 """Edit an effect's regions and their annotation layers: add, remove, move, draw.
 
-Strokes stay where they were drawn: each drawing notes the placement that a moving region had.
+Strokes stay where they were drawn: each drawing notes where its region, which may move, was at the time.
 """
 
 from collections.abc import Sequence
@@ -27,10 +27,15 @@ from . import motion_keys
 def add_region(
     effect: PropertyGroup, shutter: PropertyGroup, kind: str = "LINE", name: str = "", **values: object
 ) -> PropertyGroup:
-    """Append a region of a shutter and make it active. It gets an annotation layer unless it is a matte or ramp.
+    """Add a region at the end of the list, make it active and return it.
+
+    It gets an annotation layer for strokes, unless it is a matte or ramp.
 
     Args:
-        values: of its properties.
+        shutter: The shutter that holds in the region.
+        kind: An item of choices.KINDS.
+        name: "": the shutter's. A number makes it unique.
+        values: Further values of its properties, by name.
     """
     region = effect.regions.add()
     region.name = unique(name or shutter.name, {r.name for r in effect.regions})
@@ -46,8 +51,11 @@ def add_region(
 def first_drawn(effect: PropertyGroup, shutter: PropertyGroup, kind: str) -> PropertyGroup:
     """Return a region for new strokes: the shutter's active one if nothing is drawn in it, otherwise a new one.
 
-    The first region of a sharp shutter follows edges, because it usually marks a subject, not a spot. It does not if
-    the user has set *Follow Edges*. It becomes a subject if the model finds one under its first stroke.
+    The first region of a sharp shutter turns *Follow Edges* on, because it usually marks a subject, not a spot, unless
+    the user has set that. It becomes a subject if the model finds one under its first stroke.
+
+    Args:
+        kind: An item of choices.KINDS that the region gets.
     """
     is_sharp = bool(np.count_nonzero(bars(shutter)) <= 1)
     is_scribble = kind not in strips.LAID
@@ -63,7 +71,7 @@ def first_drawn(effect: PropertyGroup, shutter: PropertyGroup, kind: str) -> Pro
 
 
 def _undrawn(effect: PropertyGroup, shutter: PropertyGroup) -> PropertyGroup | None:
-    """Return the active region if it belongs to a shutter and nothing is drawn in it, or None."""
+    """Return the active region if it uses this shutter and nothing is drawn in it yet, else None."""
     region = selection.active_region(effect)
     if region is None or region.kind in strips.MATTES or region.shutter != shutter.name:
         return None
@@ -72,10 +80,10 @@ def _undrawn(effect: PropertyGroup, shutter: PropertyGroup) -> PropertyGroup | N
 
 
 def new_layer(effect: PropertyGroup, region: PropertyGroup, name: str = "layer") -> AnnotationLayer:
-    """Give a region an empty annotation layer with its name and its shutter's color.
+    """Give a region an empty annotation layer with its name and its shutter's color, and return that.
 
     Args:
-        name: one of annotations.LAYERS.
+        name: Which of the region's layers, one of annotations.LAYERS.
     """
     layer = annotation(effect).layers.new(region.name, set_active=name == "layer")
     layer.color = NOT_THIS if name == "not_layer" else effect.shutters[region.shutter].color
@@ -86,13 +94,14 @@ def new_layer(effect: PropertyGroup, region: PropertyGroup, name: str = "layer")
 def draw_curves(
     effect: PropertyGroup, strip: Strip, region: PropertyGroup, curves: Curves | Sequence[np.ndarray], frame: int
 ) -> None:
-    """Make curves the drawing of a region at a timeline frame.
+    """Make curves the drawing of a region at a timeline frame, in place of any that it has there.
 
     Args:
-        curves: in fractions of the picture.
+        strip: The effect strip, whose transform places them in the sequencer's image.
+        curves: Points (n, 2) of each, in fractions of the picture.
 
     Raises:
-        EffectError: the strip has a scale of 0.
+        EffectError: The strip has a scale of 0.
     """
     to_image = annotations.picture_to_image(strip, annotations.picture_size(effect))
     if not annotations.is_invertible(to_image):
@@ -108,7 +117,7 @@ def draw_curves(
 
 
 def remove_layers(effect: PropertyGroup, region: PropertyGroup) -> None:
-    """Remove a region's annotation layers."""
+    """Remove all annotation layers of a region."""
     for layer in layers_of(effect, region):
         effect.scene.annotation.layers.remove(layer)
     for name in LAYERS:
@@ -116,7 +125,7 @@ def remove_layers(effect: PropertyGroup, region: PropertyGroup) -> None:
 
 
 def remove_region(effect: PropertyGroup, index: int) -> None:
-    """Remove a region, its keyframes and its annotation layers."""
+    """Remove the region with this index, its keyframes and its annotation layers."""
     remove_layers(effect, effect.regions[index])
     name = effect.regions[index].name
     fcurves.remove_item(effect, "regions", index)
@@ -126,13 +135,19 @@ def remove_region(effect: PropertyGroup, index: int) -> None:
 
 
 def move(effect: PropertyGroup, kind: str, index: int, to: int) -> None:
-    """Move a "shutter" or a "region" in its list. The first shutter is the default, and later regions cover others."""
+    """Move a shutter or a region in its list. The first shutter is the default, and later regions cover earlier ones.
+
+    Args:
+        kind: "shutter" or "region".
+        index: Its index.
+        to: Its new index.
+    """
     fcurves.move_item(effect, f"{kind}s", index, to)
     setattr(effect, f"active_{kind}", to)
 
 
 def assign_region(effect: PropertyGroup, index: int, shutter: PropertyGroup) -> None:
-    """Assign a region to another shutter, which becomes active."""
+    """Make the region with this index use another shutter, which becomes active."""
     effect.regions[index].shutter = shutter.name
     color_layers(effect, shutter)
     effect.active_region = index
@@ -140,20 +155,28 @@ def assign_region(effect: PropertyGroup, index: int, shutter: PropertyGroup) -> 
 
 
 def hold_drawings(effect: PropertyGroup, index: int) -> None:
-    """Note the placement of a region for its drawings before it is moved. From then on they move with it."""
+    """Note where a region is at each of its drawings, before the region is moved. Its strokes then move along with it.
+
+    Args:
+        index: Of the region.
+    """
     region = effect.regions[index]
     if region.kind not in strips.LAID:
         _note(effect, region, _origins(Sampling.of(effect.id_data, effect, None, ()).drawings(index)))
 
 
 def begin_drawing(effect: PropertyGroup, strip: Strip, index: int, *, erases: bool = False) -> None:
-    """Prepare the current frame for the pen, so that strokes appear where they are drawn.
+    """Prepare a region's drawing at the current frame for the pen, so that strokes appear where they are drawn.
 
-    A drawing of this frame is first stored where it appears. The eraser also needs the strokes that another frame's
-    drawing shows here, so they are stored at this frame, too.
+    A drawing made at this frame before its region moved is first stored where it appears now. The eraser also needs the
+    strokes that are shown here from another frame's drawing, so these are stored at this frame.
+
+    Args:
+        index: Of the region.
+        erases: Whether strokes will be erased.
 
     Raises:
-        EffectError: the region has no placement.
+        EffectError: The region's strokes or place cannot be known at this frame.
     """
     region, scene = effect.regions[index], effect.id_data
     frame = scene.frame_current
@@ -171,7 +194,7 @@ def begin_drawing(effect: PropertyGroup, strip: Strip, index: int, *, erases: bo
 
 
 def _origins(drawings: Drawings) -> dict[float, Placement]:
-    """Return the placement of the region for each drawing, by frame."""
+    """Return where the region was when each of its drawings was made, by the drawing's timeline frame."""
     return dict(zip(drawings.frames, drawings.origins or repeat(Placement()), strict=False))
 
 

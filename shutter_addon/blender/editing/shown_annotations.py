@@ -1,4 +1,4 @@
-"""Show the annotation of the visible effect in previews, and leave the user's own annotations alone.
+"""Give previews the annotation of the effect that they show, and leave the user's own annotations alone.
 
 Blender shows an effect's annotation only while the pen is down, because it ignores that strokes move. Otherwise our
 draw handler draws it. Every sequencer space keeps an annotation, even in hidden editors and workspaces. It is a user of
@@ -18,7 +18,7 @@ from ..rendering import previews
 
 
 def follow() -> None:
-    """Give the visible effect's annotation to open previews that have another effect's."""
+    """Give open previews the annotation of the effect that they show at the playhead, in place of another effect's."""
     for window in bpy.data.window_managers[0].windows:
         seen = selection.seen(window.workspace.sequencer_scene or window.scene)
         for area in window.screen.areas:
@@ -29,16 +29,16 @@ def follow() -> None:
 
 
 def is_laid_wrong(space: SpaceSequenceEditor) -> bool:
-    """Return whether a preview shows an effect's annotation without the pen, or hides it with the pen."""
+    """Tell whether a preview shows an effect's annotation while the pen is up, or hides it while the pen is down."""
     is_effects = space.annotation is not None and is_own(space.annotation)
     return is_effects and space.preview_overlay.show_annotation != previews.pen_is_down()
 
 
 def is_other(space: SpaceSequenceEditor, seen: tuple | None) -> bool:
-    """Return whether a preview needs another annotation.
+    """Tell whether a preview has to get another annotation.
 
     Args:
-        seen: result of selection.seen for its scene.
+        seen: What selection.seen returns for its scene.
     """
     wanted = seen[1].scene.annotation if seen else None
     if space.annotation is None:
@@ -47,12 +47,12 @@ def is_other(space: SpaceSequenceEditor, seen: tuple | None) -> bool:
 
 
 def is_own(made: ID) -> bool:
-    """Return whether an annotation or camera was made for an effect."""
+    """Tell whether an annotation or camera was made for an effect, not by the user."""
     return made.virtual_shutter_made not in ("", USERS)
 
 
 def give(space: SpaceSequenceEditor, annotation: Annotation | None) -> None:
-    """Give a preview an effect's annotation; None: remove it until an effect is visible."""
+    """Give a preview an effect's annotation; None: take it away until an effect is visible again."""
     before = space.annotation
     if before is not None and annotation is not None and not is_own(before):
         before.use_fake_user = True  # keeps the user's annotation in the file
@@ -63,21 +63,21 @@ def give(space: SpaceSequenceEditor, annotation: Annotation | None) -> None:
 
 
 def let_go(annotation: ID) -> None:
-    """Remove an annotation from all previews."""
+    """Take an annotation away from all previews, before it is removed."""
     for space in _spaces():
         if space.annotation == annotation:
             give(space, None)
 
 
 def before_undo(*_: object) -> None:
-    """Note which previews show strokes. Blender removes undone annotations from them without restoring them."""
+    """Note which previews have an effect's annotation. Undo may take it away and does not give it back."""
     for space in _spaces():
         if space.annotation is not None and is_own(space.annotation):
             previews.looking.emptied.add(space.as_pointer())
 
 
 def forget() -> None:
-    """Forget all previews before another file is loaded."""
+    """Forget what is known of previews, before another file is loaded."""
     previews.looking.emptied.clear()
 
 

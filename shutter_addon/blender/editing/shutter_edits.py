@@ -1,4 +1,4 @@
-"""Edit an effect's shutters: add, duplicate, remove, move, time maps, and regions as layers in front of others."""
+"""Edit an effect's shutters: add, duplicate and remove them, apply presets, add time maps, and make regions layers."""
 
 import numpy as np
 from bpy.app.translations import pgettext_data as data_
@@ -28,11 +28,11 @@ COLORS = (
 
 
 def start(effect: PropertyGroup) -> None:
-    """Set up a new effect: a long shutter everywhere, and a sharp one for strokes.
+    """Set up a new effect: a shutter *Long* for the whole picture, and a shutter *Sharp* for strokes.
 
     With *Border*, the first stroke is sharp only around itself instead of everywhere. Streaks keep their length at the
-    ends of the clip, and are smooth if OpenCV is installed. Recipes set this themselves, and older files have other
-    defaults.
+    ends of the clip, and are smooth if OpenCV is installed. This is set here and not by defaults, because recipes set
+    these options themselves, and older files have other defaults.
     """
     effect.border, effect.edges = True, "SLIDE"
     effect.inbetween = "1" if opencv.cv2 is None else "AUTO"
@@ -41,10 +41,14 @@ def start(effect: PropertyGroup) -> None:
 
 
 def add_shutter(effect: PropertyGroup, name: str = "", preset: str = "ANGLE_360") -> PropertyGroup:
-    """Append a shutter and make it active.
+    """Add a shutter with the bars of a preset at the end of the list, make it active and return it.
+
+    Args:
+        name: "": "Shutter". A number makes it unique.
+        preset: A key of shutters.PRESETS.
 
     Raises:
-        EffectError: the window has no length. Nothing has changed.
+        EffectError: The window's length is out of range. Nothing has changed.
     """
     color = _free_color(effect)
     validation.number(effect, "window")
@@ -56,13 +60,15 @@ def add_shutter(effect: PropertyGroup, name: str = "", preset: str = "ANGLE_360"
 
 
 def apply_preset(effect: PropertyGroup, index: int, preset: str, key: bool = False) -> None:
-    """Give a shutter the bars of a preset, which it keeps (consistency.preset_of).
+    """Give a shutter the bars of a preset. It keeps to the preset when the window changes (consistency.preset_of).
 
     Args:
-        key: insert keyframes at the current frame.
+        index: Of the shutter.
+        preset: A key of shutters.PRESETS.
+        key: Insert keyframes at the current frame.
 
     Raises:
-        EffectError: the window has no length. Nothing has changed.
+        EffectError: The window's length is out of range. Nothing has changed.
     """
     shutter, window = effect.shutters[index], validation.number(effect, "window")
     shutter.preset, shutter.preset_position = preset, effect.position
@@ -70,14 +76,18 @@ def apply_preset(effect: PropertyGroup, index: int, preset: str, key: bool = Fal
 
 
 def _free_color(effect: PropertyGroup) -> tuple[float, float, float]:
-    """Return the first unused color. If all are used, they repeat."""
+    """Return the first of COLORS that no shutter has. If all are taken, they repeat."""
     used = np.array([shutter.color for shutter in effect.shutters]).reshape(-1, 3)
     free = [color for color in COLORS if not np.isclose(used, color, atol=1e-3).all(axis=1).any()]
     return free[0] if free else COLORS[len(used) % len(COLORS)]
 
 
 def duplicate_shutter(effect: PropertyGroup, index: int) -> PropertyGroup:
-    """Add a copy of a shutter with its keyframes after it. Its regions stay with the original."""
+    """Add a copy of a shutter, with its keyframes, right after it, and return that. Its regions stay with the original.
+
+    Args:
+        index: Of the shutter.
+    """
     scene, path, color = effect.id_data, f"{effect.path_from_id()}.shutters", _free_color(effect)
     last, new = len(effect.shutters), effect.shutters.add()
     property_copy.copy_properties(effect.shutters[index], new)
@@ -88,7 +98,7 @@ def duplicate_shutter(effect: PropertyGroup, index: int) -> PropertyGroup:
 
 
 def remove_shutter(effect: PropertyGroup, index: int) -> None:
-    """Remove a shutter, its keyframes and its regions. The first remaining one is the default."""
+    """Remove the shutter with this index, its keyframes and its regions. The first remaining shutter is the default."""
     name = effect.shutters[index].name
     for i in reversed([i for i, region in enumerate(effect.regions) if region.shutter == name]):
         remove_region(effect, i)
@@ -97,13 +107,13 @@ def remove_shutter(effect: PropertyGroup, index: int) -> None:
 
 
 def add_time_map(effect: PropertyGroup, ramp: str) -> PropertyGroup:
-    """Add two shutters that show the first and last frame of the window, and a ramp between them, which is returned.
+    """Add shutters that show the window's first and last frame, and a ramp from one to the other. Return the ramp.
 
     Args:
-        ramp: a word of choices.RAMPS.
+        ramp: An item of choices.RAMPS.
 
     Raises:
-        EffectError: the window has no length. Nothing has changed.
+        EffectError: The window's length is out of range. Nothing has changed.
     """
     region = ramp_between(effect, (data_("First"), "FIRST"), (data_("Last"), "LAST"), data_("Time Map"), ramp)
     effect.interpolation = "DISPLACEMENT"
@@ -113,19 +123,31 @@ def add_time_map(effect: PropertyGroup, ramp: str) -> PropertyGroup:
 def ramp_between(
     effect: PropertyGroup, first: tuple[str, str], last: tuple[str, str], name: str, ramp: str
 ) -> PropertyGroup:
-    """Add two shutters, by name and preset, and a ramp between them. The first one becomes the default."""
+    """Add two shutters and a ramp region from the first to the second, and return the ramp.
+
+    The first shutter becomes the default.
+
+    Args:
+        first: Its name and a preset.
+        last: Name and a preset of the second shutter.
+        name: Of the ramp.
+        ramp: An item of choices.RAMPS.
+    """
     add_shutter(effect, *first)
     move(effect, "shutter", effect.active_shutter, 0)
     return add_region(effect, add_shutter(effect, *last), "RAMP", name, ramp=ramp)
 
 
 def as_layer(effect: PropertyGroup, index: int, own: str, rest: str, key: bool = False) -> None:
-    """Make a region a layer, alone in its shutter, in front of the default shutter. Neither follows anything.
+    """Make a region a layer in front of the rest of the picture, exposed by a shutter that it alone uses.
+
+    Neither that shutter nor the default one, which exposes the rest, follows anything afterwards.
 
     Args:
-        own: preset of the layer.
-        rest: preset of the default shutter.
-        key: insert keyframes for the bars.
+        index: Of the region.
+        own: Preset of the layer's shutter.
+        rest: Preset of the default shutter.
+        key: Insert keyframes for the bars.
     """
     region = effect.regions[index]
     place = effect.shutters.find(region.shutter)

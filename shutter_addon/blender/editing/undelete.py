@@ -1,6 +1,6 @@
-"""Effects in memory: removed ones, for strips that are cut and pasted, and the one that *Copy Effect* took.
+"""Effects kept in memory: removed ones, for strips that are cut and pasted, and the one that *Copy Effect* copied.
 
-Blender's clipboard has Scene strips without their scenes, and outlives the file.
+Blender's clipboard has Scene strips without their scenes, and outlives the file. So plain data is kept.
 """
 
 from __future__ import annotations
@@ -22,13 +22,16 @@ _effects: RecentValues[str, dict] = RecentValues()
 
 
 def keep(effect: PropertyGroup) -> None:
-    """Keep a removed effect under its identity, with its properties, F-curves and annotation."""
+    """Keep in memory an effect that is about to be removed: properties, F-curves and annotation.
+
+    It can be restored by the identity of its effect scene.
+    """
     if effect.scene is not None and effect.scene.virtual_shutter.identity:
         _keep(effect.scene.virtual_shutter.identity, effect)
 
 
 def copy(effect: PropertyGroup, strip: Strip) -> None:
-    """Keep an effect for `paste`."""
+    """Keep an effect of a strip, for `paste`."""
     places = match_source.places(effect, strip)
     _keep(_COPIED, effect, first=strip.left_handle, skipped=strips.skipped(strip), places=places)
 
@@ -38,14 +41,17 @@ def has_copy() -> bool:
 
 
 def forget_copy() -> None:
-    """Forget the copied effect. It points to images of a file, which is about to be closed."""
+    """Forget the copied effect, because it points to images of a file that is about to be closed."""
     _effects.pop(_COPIED, None)
 
 
 def paste(effect: PropertyGroup, strip: Strip) -> None:
-    """Replace an effect's shutters, regions, keyframes and options with the copied ones.
+    """Replace an effect's shutters, regions, keyframes and options by those of the copied effect.
 
-    Frames count from the first frame of a strip. Drawings keep their place on the picture.
+    Frames count from the first frame of each strip. Drawings keep their place on the picture.
+
+    Args:
+        strip: The effect strip of `effect`.
     """
     data, scene = _effects[_COPIED], effect.id_data
     recipe_import.clear(scene, effect)
@@ -79,12 +85,19 @@ def _keep(identity: str, effect: PropertyGroup, **more: object) -> None:
 
 
 def forget() -> None:
-    """Forget all effects when the extension is disabled."""
+    """Forget all kept effects, when the extension is disabled."""
     _effects.clear()
 
 
 def restore(scene: Scene, identity: str) -> Scene | None:
-    """Restore a kept effect in a scene and return its effect scene; None: no effect has this identity."""
+    """Make a kept effect again in a scene, with a new effect scene.
+
+    Args:
+        identity: Of the effect scene that it had.
+
+    Returns:
+        The new effect scene; None: no effect was kept under this identity.
+    """
     if (data := _effects.get(identity)) is None:
         return None
     effect_scene = add_effect.new_effect_scene(scene, identity, *data["scene"])
@@ -95,7 +108,12 @@ def restore(scene: Scene, identity: str) -> Scene | None:
 
 
 def _restore(scene: Scene, effect: PropertyGroup, data: dict, content: dict) -> None:
-    """Fill an effect with kept properties, keyframes and drawings."""
+    """Fill an effect with properties, keyframes and strokes that were kept.
+
+    Args:
+        data: What _keep has kept, for F-curves and strokes.
+        content: The properties to set.
+    """
     _fill(effect, content)
     for plain in data["curves"]:
         path = effect.path_from_id() + plain["data_path"]

@@ -1,1 +1,1 @@
-"""The user interface: operators, panels, preview, gizmos, translations."""
+"""The user interface in Blender's sequencer: operators, panels, menus, live preview, gizmos, translations."""

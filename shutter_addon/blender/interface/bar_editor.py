@@ -1,4 +1,4 @@
-"""The bar editor: a gizmo in the preview that shows the active shutter's bars, to paint and key them."""
+"""The bar editor: a gizmo in the preview that shows the active shutter's bars (weights of frames), to paint and key."""
 
 from dataclasses import dataclass
 
@@ -24,12 +24,13 @@ _THRESHOLD = 3  # interface units: a longer movement is a drag
 
 @dataclass(frozen=True)
 class Layout:
-    """Where the bars lie in the region, in pixels.
+    """Where the bar editor and its bars lie in the preview's region, in pixels.
 
     Attributes:
-        frame: around everything; left, bottom, right, top.
-        box: around the bars.
-        top: weight at the box's upper edge.
+        frame: Box around everything: left, bottom, right, top.
+        box: Box around the bars.
+        count: Number of bars.
+        top: Weight of a bar that reaches the upper edge of `box`.
     """
 
     frame: tuple[float, float, float, float]
@@ -38,12 +39,12 @@ class Layout:
     top: float
 
     def bar_at(self, x: float) -> int:
-        """Return the bar under x. Beyond the ends it is the first or last one."""
+        """Return the index of the bar at x. Beyond the ends it is the first or last one."""
         left, _, right, _ = self.box
         return min(max(int((x - left) / (right - left) * self.count), 0), self.count - 1)
 
     def weight_at(self, y: float) -> float:
-        """Return the weight at y, at least 0."""
+        """Return the weight of a bar that reaches up to y, at least 0."""
         _, bottom, _, top = self.box
         return max((y - bottom) / (top - bottom) * self.top, 0.0)
 
@@ -53,10 +54,12 @@ class Layout:
 
 
 def layout(width: float, bars: np.ndarray, unit: float) -> Layout:
-    """Return the layout of bars (L,) at the lower left of a region of this width.
+    """Return the layout of the bar editor, at the lower left of a preview.
 
     Args:
-        unit: pixels per interface unit.
+        width: Of the preview's region, in pixels.
+        bars: The bars (L,) to show.
+        unit: Pixels per interface unit.
     """
     margin, pad = _MARGIN * unit, _PAD * unit
     # A narrow region shows the left part of the editor.
@@ -73,7 +76,15 @@ def _layout(context: Context, bars: np.ndarray) -> Layout:
 def painted(
     values: np.ndarray, place: Layout, start: tuple[float, float], end: tuple[float, float], snap: bool
 ) -> np.ndarray:
-    """Return bars (L,) after a stroke between two points: each bar that it crosses gets its height there."""
+    """Return bars (L,) after the pointer was dragged between two points: each bar on its way gets its height there.
+
+    Args:
+        values: The bars before, (L,).
+        place: Where they lie.
+        start: Point in pixels of the region.
+        end: Point in pixels of the region.
+        snap: Round weights to multiples of _SNAP.
+    """
     result = np.array(values, dtype=np.float64)
     first, last = place.bar_at(start[0]), place.bar_at(end[0])
     steps = abs(last - first)
@@ -86,7 +97,7 @@ def painted(
 
 
 def bar_under(context: Context, x: float, y: float) -> int | None:
-    """Return the active shutter's bar at a point of the preview's region, or None."""
+    """Return the index of the active shutter's bar at a point of a preview, in pixels; None: there is none."""
     if context.region is None or context.region.type != "PREVIEW" or (seen := _seen(context)) is None:
         return None
     place = _layout(context, seen[3])
@@ -94,7 +105,11 @@ def bar_under(context: Context, x: float, y: float) -> int | None:
 
 
 def _seen(context: Context) -> tuple[Scene, PropertyGroup, Strip, np.ndarray, list[str]] | None:
-    """Return the visible scene, effect and strip with the bars and their key states; None: there are no valid bars."""
+    """Return what the bar editor shows; None: no effect is visible, or its bars are invalid.
+
+    Returns:
+        Scene, effect and effect strip, the active shutter's bars (L,), and their key states (bar_edits.key_state).
+    """
     seen = selection.in_picture(context)
     if seen is None or selection.active_shutter(effect := seen[1]) is None:
         return None
@@ -172,7 +187,12 @@ def _draw(place: Layout, shutter: PropertyGroup, values: np.ndarray, states: lis
 
 
 def _draw_header(place: Layout, shutter: PropertyGroup, index: int, words: str) -> None:
-    """Draw the shutter's swatch and a text above the bars."""
+    """Draw the shutter's color with its pattern, and a text, above the bars.
+
+    Args:
+        index: Of the shutter.
+        words: The text.
+    """
     unit, (left, _, _, top) = drawing.ui_scale(), place.box
     bottom = top + 4 * unit
     start, (_, _, right, upper) = left + (_SWATCH + 6) * unit, place.frame

@@ -1,4 +1,7 @@
-"""Draw shapes and text in pixels of a region, and pictures in the place of a preview's strip (shaders/show.glsl)."""
+"""Draw shapes, text and pictures over a preview, with Blender's `gpu` module. Coordinates are pixels of a region.
+
+Pictures are drawn in place of a strip's own picture, with shaders/show.glsl.
+"""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -28,20 +31,20 @@ BACK = (0.08, 0.08, 0.08, 0.8)  # behind texts and bars, to be readable on any f
 
 
 def ui_scale() -> float:
-    """Return pixels per interface unit."""
+    """Return how many pixels an interface unit has, which the screen's density and *Resolution Scale* determine."""
     return bpy.context.preferences.system.ui_scale
 
 
 def line_width() -> float:
-    """Return the width of Blender's own lines in pixels, which *Resolution Scale* and *Line Width* set."""
+    """Return the width of Blender's own lines in pixels, which *Resolution Scale* and *Line Width* determine."""
     return bpy.context.preferences.system.pixel_size
 
 
 def wrapped(words: str, width: float, size: float | None = None) -> list[str]:
-    """Break words into lines up to a width in pixels.
+    """Break a text into lines that are at most `width` pixels wide.
 
     Args:
-        size: points; None: as in Blender's panels.
+        size: Of the letters, in points; None: as in Blender's panels.
     """
     blf.size(0, (size or bpy.context.preferences.ui_styles[0].widget.points) * ui_scale())
     lines = [""]
@@ -56,7 +59,10 @@ def wrapped(words: str, width: float, size: float | None = None) -> list[str]:
 
 @contextmanager
 def pixel_space(region: Region) -> Iterator[None]:
-    """Use the region's pixels as coordinates. Blender's own state varies between draw handlers."""
+    """Make the region's pixels the coordinates of what is drawn within a `with` block, origin at the lower left.
+
+    Needed because Blender calls draw handlers with different coordinates.
+    """
     with gpu.matrix.push_pop(), gpu.matrix.push_pop_projection():
         gpu.matrix.load_identity()
         x, y = 2 / region.width, 2 / region.height
@@ -68,8 +74,8 @@ def rectangles(boxes: Sequence[Box] | np.ndarray, colors: ArrayLike) -> None:
     """Draw filled boxes.
 
     Args:
-        boxes: (n, 4) left, bottom, right, top.
-        colors: (n, 4) display values with straight alpha.
+        boxes: (n, 4): left, bottom, right, top.
+        colors: (n, 4): display values 0 to 1 with straight alpha.
     """
     if not len(boxes):
         return
@@ -85,10 +91,11 @@ def rectangles(boxes: Sequence[Box] | np.ndarray, colors: ArrayLike) -> None:
 
 
 def bars(box: Box, shares: np.ndarray, color: Sequence[float]) -> list[Box]:
-    """Draw bars side by side in a box and return their boxes.
+    """Draw bars side by side in a box, and return the box of each bar.
 
     Args:
-        shares: (n,) heights as fractions of the box. Each bar is at least a line.
+        shares: Heights (n,) as fractions of the box. Each bar is at least one line high.
+        color: Display values 0 to 1, with alpha.
     """
     left, bottom, right, top = box
     edges = np.linspace(left, right, len(shares) + 1)
@@ -102,7 +109,12 @@ def bars(box: Box, shares: np.ndarray, color: Sequence[float]) -> list[Box]:
 
 
 def swatch(left: float, bottom: float, size: float, shutter: PropertyGroup, index: int) -> None:
-    """Draw a square with a shutter's color and pattern, as in the view *Mattes*."""
+    """Draw a square with a shutter's color and pattern, as the view *Mattes* shows its pixels.
+
+    Args:
+        size: Side of the square.
+        index: Of the shutter, which determines the pattern.
+    """
     left, bottom = round(left), round(bottom)
     rectangles([(left, bottom, left + size, bottom + size)], [(*shutter.color, 1.0)])
     y, x = np.mgrid[: round(size), : round(size)]
@@ -116,7 +128,8 @@ def lines(points: ArrayLike, color: Sequence[float], closed: bool = False, width
     """Draw a line through points (n, 2).
 
     Args:
-        width: as a multiple of Blender's line width.
+        closed: Also draw from the last point to the first.
+        width: In line_width().
     """
     points = np.asarray(points, dtype=np.float32)
     if len(points) < 2:
@@ -133,10 +146,10 @@ def lines(points: ArrayLike, color: Sequence[float], closed: bool = False, width
 
 
 def text(x: float, y: float, words: str, until: float | None = None) -> None:
-    """Draw text with its lower left corner at a point.
+    """Draw a line of text, with its lower left corner at (x, y).
 
     Args:
-        until: x at which it is cut off.
+        until: x at which it is cut off; None: nowhere.
     """
     size = SIZE * ui_scale()
     blf.size(0, size)
@@ -153,13 +166,13 @@ def text(x: float, y: float, words: str, until: float | None = None) -> None:
 
 
 def text_width(words: str) -> float:
-    """Return the width of a text in pixels."""
+    """Return the width in pixels of a text that `text` would draw."""
     blf.size(0, SIZE * ui_scale())
     return blf.dimensions(0, words)[0]
 
 
 class Quad:
-    """The area of a strip's picture in a preview's region, with its crop."""
+    """Draws pictures where a preview shows a strip's picture: moved, cropped and cut off in the same way."""
 
     shaders: dict[str, GPUShader] = {}  # by pass, because compiling takes long
 
@@ -173,7 +186,15 @@ class Quad:
         self._high = 1 - np.array([crop.max_x / width, crop.max_y / height])
 
     def draw(self, name: str, textures: dict, left: float = 0.0, right: float = 1.0, **constants) -> None:
-        """Draw from `left` to `right`, as fractions of the picture's width, with a pass of shaders/show.glsl."""
+        """Draw a picture, or a part of its width, with a pass of shaders/show.glsl.
+
+        Args:
+            name: Of the pass.
+            textures: The pass's textures, by sampler.
+            left: Left edge of the drawn part, as a fraction of the picture's width.
+            right: Right edge of it.
+            constants: Values of the pass's constants.
+        """
         low, high = np.maximum(self._low, (left, 0)), np.minimum(self._high, (right, 1))
         if (low >= high).any():
             return
@@ -190,7 +211,7 @@ class Quad:
         gpu.state.blend_set("NONE")
 
     def _clipped(self, batch: GPUBatch, shader: GPUShader) -> None:
-        """Draw only what lies in the sequencer's image, which cuts off strips."""
+        """Draw a batch, but only inside the image that the sequencer shows, which cuts strips off as well."""
         left, bottom, width, height = before = gpu.state.scissor_get()
         low = np.maximum(np.rint(self._image[0]), (left, bottom))
         high = np.minimum(np.rint(self._image[1]), (left + width, bottom + height))
@@ -203,7 +224,7 @@ class Quad:
 
 
 def shader_of(name: str) -> GPUShader:
-    """Return the shader of a pass of shaders/show.glsl, compiled once."""
+    """Return the compiled shader of a pass of shaders/show.glsl. It is compiled once, because that takes long."""
     if name not in Quad.shaders:
         quad, shown = read_pass("show", "QUAD"), read_pass("show", name)
         between = gpu.types.GPUStageInterfaceInfo("show_interface")
@@ -222,6 +243,6 @@ def shader_of(name: str) -> GPUShader:
 
 
 def free() -> None:
-    """Free the shaders."""
+    """Free the compiled shaders."""
     blender_gpu.free(*Quad.shaders.values())
     Quad.shaders.clear()

@@ -45,7 +45,10 @@ class SHUTTER_OT_full_quality(Named, Operator):
 
 
 def _shown(context: Context) -> tuple[Window, Area, preview_areas.Shown] | None:
-    """Return the window, area and content of a preview that shows an effect, preferring the context's, or None."""
+    """Return a preview that shows an effect: window, area and what it shows; None: there is none.
+
+    The area of the context comes first.
+    """
     areas = sorted(preview_areas.previews(context), key=lambda pair: pair[1] != context.area)
     for window, area in areas:
         with preview_areas.within(window, area):
@@ -55,10 +58,18 @@ def _shown(context: Context) -> tuple[Window, Area, preview_areas.Shown] | None:
 
 
 def _bring_back(address: int, proxies: tuple[str, bool], rows: float, centre: tuple[float, float]) -> float | None:
-    """Restore zoom, center and proxy settings of an area at the end, except for those that the user has changed since.
+    """Restore zoom, center and proxy settings of a preview once *Full Quality* has ended. This is a timer of Blender.
+
+    What the user has changed meanwhile stays.
 
     Args:
-        rows, centre: see `_view_of`.
+        address: Of the area, as_pointer().
+        proxies: proxy_render_size and use_proxies to restore.
+        rows: Zoom to restore, as in `_view_of`.
+        centre: Center to restore, as in `_view_of`.
+
+    Returns:
+        Seconds until the next call; None: it is done.
     """
     if previews.looking.whole is not None:
         return _TICK
@@ -76,7 +87,10 @@ def _bring_back(address: int, proxies: tuple[str, bool], rows: float, centre: tu
 
 
 def _view_of(region: Region) -> tuple[float, tuple[float, float]]:
-    """Return how many rows of the picture a region shows, and the position in its center."""
+    """Return a preview's zoom, as the number of picture rows that its region shows, and the point at its center.
+
+    The point is in the sequencer's image space: pixels, origin at the image's center, y up.
+    """
     size = region.width, region.height
     (left, bottom), (right, top) = (region.view2d.region_to_view(*at) for at in ((0, 0), size))
     # Blender counts one pixel less.

@@ -1,4 +1,4 @@
-"""Base classes of gizmos in previews and of their groups, with keymaps; and how the picture lies in a preview."""
+"""Base classes of the gizmos in previews and of their groups with shortcuts, and where a preview shows the picture."""
 
 from typing import NamedTuple
 
@@ -45,9 +45,10 @@ class Dragged(Mixin):
 
 
 class InPreview(Mixin):
-    """A gizmo group in previews, with one gizmo.
+    """A gizmo group that shows one gizmo in previews with an effect, while the live preview is on.
 
-    Subclasses have `is_wanted(live)`, which tells whether to show it with these settings of the live preview.
+    Subclasses have `gizmo`, the gizmo's class, and `is_wanted(live)`, which tells whether the settings of the live
+    preview want it.
     """
 
     bl_space_type = "SEQUENCE_EDITOR"
@@ -65,10 +66,10 @@ class InPreview(Mixin):
 
 
 class WithKeys(InPreview):
-    """A gizmo group with a keymap and a `poll` of its own. It keeps Blender's own key for annotating.
+    """A gizmo group with shortcuts and its own `poll`. Blender's key for annotating (D) also works over its gizmos.
 
     Attributes:
-        shortcuts: operator, type and value of the event, and other arguments of Blender's keymap items.
+        shortcuts: Of each, the operator, type and value of the event, and further arguments of keymap_items.new.
     """
 
     shortcuts: tuple[tuple[str, str, str, dict], ...] = (TWEAK,)
@@ -84,33 +85,33 @@ class WithKeys(InPreview):
 
 
 class View(NamedTuple):
-    """How an effect's picture lies in a preview's region.
+    """Where a preview shows an effect's picture.
 
     Attributes:
-        matrix: from fractions of the picture to pixels of the region.
-        aspect: width of the picture divided by its height.
+        matrix: (3, 3), from fractions 0 to 1 of the picture to pixels of the region.
+        aspect: Width of the picture divided by its height.
     """
 
     matrix: np.ndarray
     aspect: float
 
     def on_region(self, points: ArrayLike) -> np.ndarray:
-        """Convert points (n, 2) of the picture to pixels of the region."""
+        """Convert points (n, 2) in fractions of the picture to pixels of the region."""
         return mapped(self.matrix, np.asarray(points, np.float64))
 
     def on_picture(self, x: float, y: float) -> np.ndarray:
-        """Convert a point of the region to fractions of the picture."""
+        """Convert a point in pixels of the region to fractions of the picture (2,)."""
         return mapped(np.linalg.inv(self.matrix), np.array([(x, y)], np.float64))[0]
 
 
 def view(effect: PropertyGroup, strip: Strip, region: Region) -> View:
-    """Return the view of an effect's picture in a preview's region."""
+    """Return where a region of a preview shows an effect's picture."""
     width, height = size = annotations.picture_size(effect)
     return View(annotations.picture_to_region(strip, size, region), width / height)
 
 
 def unregister() -> None:
-    """Remove the keymaps, which Blender leaves behind."""
+    """Remove the groups' keymaps, which Blender leaves behind."""
     made = {group.__name__ for group in WithKeys.__subclasses__()}
     keyconfigs = bpy.context.window_manager.keyconfigs
     for keyconfig in filter(None, (keyconfigs.default, keyconfigs.user)):

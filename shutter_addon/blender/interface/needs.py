@@ -1,4 +1,4 @@
-"""What operators need from an effect. Each function returns why it is missing, in the user's language, or None."""
+"""Conditions for operators: functions that return why an effect does not fit, in the user's language, or None."""
 
 from collections.abc import Collection
 
@@ -20,10 +20,11 @@ def a_region(effect: PropertyGroup) -> str | None:
 
 
 def _of_kind(kinds: Collection[str], sentence: str) -> Need:
-    """Return a need for a region of some kinds.
+    """Return a condition that the active region is of one of some kinds.
 
     Args:
-        sentence: why another region does not fit, in English.
+        kinds: Items of choices.KINDS.
+        sentence: Why another region does not fit, in English.
     """
 
     def need(effect: PropertyGroup) -> str | None:

@@ -1,4 +1,4 @@
-"""Base classes and helpers of operators: why they are greyed out, their errors, and operators that run for a while."""
+"""Base classes and helpers of operators: why they are greyed out, errors, and operators that run for some time."""
 
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -21,7 +21,7 @@ Change = Callable[[Operator, Context, PropertyGroup], set[str] | None]  # change
 
 
 def redraw(context: Context) -> None:
-    """Redraw editors that show the effect. Blender does not know that its data changed."""
+    """Redraw the editors that show effects or their keys, because Blender does not know that their data changed."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:
             if area.type in {"SEQUENCE_EDITOR", "DOPESHEET_EDITOR", "GRAPH_EDITOR"}:
@@ -29,9 +29,13 @@ def redraw(context: Context) -> None:
 
 
 def report(operator: Operator, sentence: str, kind: str = "WARNING") -> set[str]:
-    """Report a translated sentence as a warning or error, and keep it for *Copy Report* without its names.
+    """Show a translated sentence as an operator's warning or error. *Copy Report* gets it without its names.
 
-    Return the result of an operator that has changed nothing.
+    Args:
+        kind: "WARNING" or "ERROR".
+
+    Returns:
+        {"CANCELLED"}, the result of an operator that has changed nothing.
     """
     recent_errors.record(level=2)
     operator.report({kind}, sentence)
@@ -39,16 +43,20 @@ def report(operator: Operator, sentence: str, kind: str = "WARNING") -> set[str]
 
 
 def given(kind: Callable, name: str, description: str, **more: Any) -> Any:
-    """Return a property of an operator that buttons set. Blender would otherwise reuse the last button's value.
+    """Return a property of an operator that buttons set and Blender does not remember for the next call.
 
     Args:
-        kind: of bpy.props.
+        kind: A function of bpy.props, such as StringProperty.
+        more: Further arguments of it.
     """
     return kind(name=name, description=description, options={"SKIP_SAVE"}, **more)
 
 
 def kept(items: Callable[[Context], Iterable[tuple]]) -> Callable[[object, Context], list[tuple]]:
-    """Turn a function into the `items` of an EnumProperty. Blender needs the last list to stay in memory."""
+    """Turn a function of the context into the `items` of an EnumProperty.
+
+    It keeps the last list in memory, because Blender reads the strings in it later.
+    """
     last: list[tuple] = []
 
     def given(_self: object, context: Context) -> list[tuple]:
@@ -59,10 +67,11 @@ def kept(items: Callable[[Context], Iterable[tuple]]) -> Callable[[object, Conte
 
 
 class Named(Mixin):
-    """An operator whose bl_idname comes from its class name.
+    """An operator that gets its bl_idname from its class name: SHUTTER_OT_draw becomes shutter.draw.
 
     Attributes:
-        icon, choices: how menus show it (panel_parts.draw_operators).
+        icon: Shown beside it in menus (panel_parts.draw_operators).
+        choices: Name of its enum property whose items menus show as a submenu; "": none.
     """
 
     icon = "NONE"
@@ -74,7 +83,7 @@ class Named(Mixin):
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        """Grey the operator out and show the reason, if there is one."""
+        """Tell Blender whether the operator can be used; if not, its tooltip gives the reason from `refusal`."""
         if sentence := cls.refusal(context):
             cls.poll_message_set(sentence)
         return not sentence
@@ -85,7 +94,11 @@ class Named(Mixin):
         return None
 
     def tried(self, step: Callable[..., set[str] | None], *arguments: object) -> set[str]:
-        """Run a step and return its result, {"FINISHED"} by default. Errors are reported."""
+        """Call a step of the operator, and report errors that the user can cause.
+
+        Returns:
+            The step's result, {"FINISHED"} if that is None, or {"CANCELLED"} after an error.
+        """
         try:
             return step(*arguments) or {"FINISHED"}
         except (*FAULTS, UserError) as error:
@@ -93,12 +106,15 @@ class Named(Mixin):
 
 
 class OfEffect(Named):
-    """An operator that changes the visible effect, or else the effect of the active strip.
+    """An operator that changes the effect of the active strip, or else the one that is visible (selection.active).
+
+    Subclasses have `change(context, effect)`, which does the work.
 
     Attributes:
-        needs: each may return why the effect does not fit. The first reason counts.
-        only_seen: the effect has to be visible in the preview.
-        edit, effect_strip: scene and strip of the effect, set before `change` is called.
+        needs: Functions that return why the effect does not fit, or None. The first reason is shown.
+        only_seen: Whether the effect has to be visible in the preview.
+        edit: Scene of the effect, set before `change` is called.
+        effect_strip: The effect strip, set before `change` is called.
     """
 
     bl_options = UNDOABLE
@@ -126,9 +142,15 @@ class OfEffect(Named):
 def operator(
     label: str, *needs: Need, icon: str = "NONE", options: set[str] = UNDOABLE, only_seen: bool = False, **own: Any
 ) -> Callable[[Change], type[Operator]]:
-    """Make an operator from a function that changes an effect. Its name, label and docstring become the operator's.
+    """Return a decorator that makes an operator class from a function that changes an effect.
 
-    Other arguments are those of OfEffect, and its `own` properties, of which menus show the choices of the first.
+    The function's name becomes the operator's, and its docstring the tooltip.
+
+    Args:
+        label: The operator's name for users.
+        needs, icon, only_seen: As in OfEffect and Named.
+        options: bl_options.
+        own: Properties of the operator. Menus show the items of the first enum as a submenu.
     """
 
     def made(change: Change) -> type[Operator]:
@@ -150,16 +172,15 @@ def operator(
 
 
 class Beside(Named):
-    """An operator that works in steps while Blender goes on. In the background and in scripts it does everything at
-    once.
+    """An operator that works in steps while Blender stays usable, but all at once in the background and in scripts.
 
     Subclasses have `begin(context, waits)`, which does everything if `waits`, and otherwise returns `go_on(context)`;
     `goes_on(context)`, which does a step and returns whether there are more; and `end(context, is_stopped)`, called
     after the last step or Esc. `tried` handles what `begin` and `end` return or raise.
 
     Attributes:
-        tick: seconds between steps.
-        blocks: whether Blender ignores other input meanwhile.
+        tick: Seconds between steps.
+        blocks: Whether Blender ignores other input meanwhile.
     """
 
     tick = 0.1
@@ -167,7 +188,7 @@ class Beside(Named):
     timers: list = []  # of all running operators
 
     def leave(self, context: Context) -> None:
-        """Remove the timer and the text in the status bar."""
+        """Stop the operator's timer, and remove its text from the status bar."""
         if self._timer in self.timers:
             self.timers.remove(self._timer)
             context.window_manager.event_timer_remove(self._timer)
@@ -199,28 +220,28 @@ class Beside(Named):
         return self.tried(self.end, context, is_stopped)
 
     def cancel(self, context: Context) -> None:
-        """Clean up when Blender closes the operator's window."""
+        """Stop when Blender closes the operator's window."""
         self.leave(context)
 
 
 def show_status(words: str | None) -> None:
-    """Show a text in the status bar of all workspaces; None: Blender's own."""
+    """Show a text in the status bar of all windows; None: what Blender shows there."""
     for workspace in bpy.data.workspaces:
         workspace.status_text_set(words)
 
 
 def end_all() -> None:
-    """End all running operators before another file is loaded."""
+    """End all running operators that work in steps (Beside), before another file is loaded."""
     while Beside.timers:  # Blender crashes if the status text changes while it quits
         bpy.context.window_manager.event_timer_remove(Beside.timers.pop())
         show_status(None)
 
 
 def chosen_file(operator: Operator) -> str:
-    """Return the operator's file path.
+    """Return the path of the file that the user chose for an operator.
 
     Raises:
-        RecipeError: no file was chosen.
+        RecipeError: None was chosen.
     """
     if not operator.filepath:
         raise recipe.RecipeError(rpt_("Choose a file"))

@@ -1,4 +1,4 @@
-"""Operators of effects, shutters, regions and recipes. Each calls a function of `editing`."""
+"""Operators for effects, shutters, regions and recipes. Each calls a function of `editing`, which does the work."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -38,10 +38,10 @@ def why_no_effect(context: Context) -> str | None:
 
 
 def give_effect(context: Context) -> None:
-    """Add an effect to the active strip and show its panel.
+    """Add an effect with the usual shutters to the active strip, select its strip and show its panel.
 
     Raises:
-        FAULTS: it is impossible.
+        FAULTS: The strip's footage cannot be read.
     """
     scene = selection.scene_of(context)
     strip, effect = add_effect.add_effect(scene, selection.active_strip(context))
@@ -68,7 +68,7 @@ class SHUTTER_OT_add_effect(Named, Operator):
 
 
 class MakesEffect(Mixin):
-    """A mix-in for operators that first add an effect if the active strip has none."""
+    """A mix-in for operators on an effect. If the active strip can have one and has none, they first add it."""
 
     @classmethod
     def refusal(cls, context: Context) -> str | None:
@@ -113,7 +113,11 @@ def clean_trail(_self: Operator, context: Context, effect: PropertyGroup) -> Non
 
 
 def _choose_tab(waits: Iterator[float]) -> float | None:
-    """Open the sidebar's Shutter tab in all previews, as a timer."""
+    """Open the sidebar's Shutter tab in all previews, once they are drawn. This is a timer of Blender.
+
+    Args:
+        waits: Seconds to wait each time a sidebar is not drawn yet. When they run out, it is left as it is.
+    """
     areas = [area for _window, area in preview_areas.previews(bpy.context)]
     sidebars = [next(region for region in area.regions if region.type == "UI") for area in areas]
     drawn = [s for s in sidebars if not s.is_property_readonly("active_panel_category")]
@@ -151,7 +155,16 @@ _DIRECTION = EnumProperty(name="Direction", items=(("UP", "Up", ""), ("DOWN", "D
 
 
 def _move(effect: PropertyGroup, kind: str, direction: str, places: list[int]) -> set[str] | None:
-    """Move the active "shutter" or "region" one place up or down among those that the list shows."""
+    """Move the active shutter or region one place up or down in its list.
+
+    Args:
+        kind: "shutter" or "region".
+        direction: "UP" or "DOWN".
+        places: Indices of those that the list shows.
+
+    Returns:
+        {"CANCELLED"} if it is at the end already.
+    """
     index = getattr(effect, f"active_{kind}")
     step = places.index(index) + (1 if direction == "DOWN" else -1)
     if not 0 <= step < len(places):
@@ -168,7 +181,7 @@ def shutter_move(self: Operator, _context: Context, effect: PropertyGroup) -> se
 
 @kept
 def _presets(_context: Context) -> list[tuple]:
-    """Return the presets with their icons, which exist only while the extension is registered."""
+    """Return the enum items of the presets, with icons. Icons exist only while the extension is registered."""
     presets = enumerate(shutters.PRESETS.items())
     return [(name, label, description, icon_of(name), i) for i, (name, (label, description, _make)) in presets]
 
@@ -265,10 +278,12 @@ def erase(self: Operator, context: Context, effect: PropertyGroup) -> None:
 
 
 def _take_tool(by: Operator, context: Context, effect: PropertyGroup, tool: str, layer: str = "layer") -> None:
-    """Make a layer of the active region the active annotation and activate a drawing tool in all previews.
+    """Activate an annotation tool in all previews, to draw on an annotation layer of the active region.
 
     Args:
-        layer: one of annotations.LAYERS.
+        by: The operator that reports if there is no preview.
+        tool: Blender's name of it.
+        layer: Which of the region's layers, one of annotations.LAYERS.
     """
     region = selection.active_region(effect)
     if annotations.layer_of(effect, region, layer) is None:

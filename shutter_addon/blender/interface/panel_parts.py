@@ -1,4 +1,4 @@
-"""Parts of panels: sentences, lists, buttons, and the icons of presets and patterns."""
+"""Parts of panels: sentences, lists, buttons, factories for panels and menus, and icons of presets and patterns."""
 
 from collections.abc import Callable
 from functools import cache
@@ -26,11 +26,11 @@ _LIGHT = (0.8, 0.8, 0.8)
 
 
 def sentence(layout: UILayout, words: str, icon: str = "NONE", room: float = 1.0, is_quiet: bool = False) -> None:
-    """Draw a translated sentence in as many lines as the panel needs.
+    """Draw a translated sentence, broken into as many lines as the panel's width needs.
 
     Args:
-        room: fraction of the panel's width.
-        is_quiet: draw it greyed out.
+        room: Fraction of the panel's width that it has.
+        is_quiet: Draw it greyed out.
     """
     unit, region = drawing.ui_scale(), bpy.context.region
     beside = _MARGIN if icon == "NONE" else _MARGIN + _ICON
@@ -44,11 +44,11 @@ def sentence(layout: UILayout, words: str, icon: str = "NONE", room: float = 1.0
 
 
 def draw_list(layout: UILayout, effect: PropertyGroup, kind: str, count: int) -> None:
-    """Draw the list of shutters or regions with its buttons.
+    """Draw the list of shutters or regions with its buttons, such as Add and Remove.
 
     Args:
         kind: "shutter" or "region".
-        count: number of items that the list shows.
+        count: Number of items that the list shows.
     """
     row = layout.row()
     rows = min(max(count, 1), _MOST_ROWS)
@@ -67,9 +67,12 @@ def draw_list(layout: UILayout, effect: PropertyGroup, kind: str, count: int) ->
 
 
 def draw_operators(layout: UILayout, *names: str) -> None:
-    """Draw operators of the extension, and a separator for "".
+    """Draw buttons or menu entries for operators of the extension.
 
-    An operator's `icon` is beside it, and the items of its property `choices` are a submenu.
+    An operator with `choices` becomes a submenu of them.
+
+    Args:
+        names: What follows "shutter." in their bl_idname; "" draws a separator. Those of removed features are left out.
     """
     for name in names:
         if not name:
@@ -92,13 +95,15 @@ def draw_properties(layout: UILayout, owner: bpy.types.bpy_struct, *names: str) 
 def panel(
     end: str, label: str, draws: Draws, shows: Callable | None = None, within: str = "", **look: object
 ) -> type[Panel]:
-    """Make a panel of the Shutter tab that shows the effect, closed by default.
+    """Make a panel of the Shutter tab about the active effect, closed by default.
 
     Args:
-        end: of its name. `within` is that of the panel that contains it.
-        draws: draws its content.
-        shows: returns what the panel shows of an effect; without it the panel is hidden.
-        look: other class attributes for Blender.
+        end: End of its class name, after SEQUENCER_PT_shutter.
+        label: Its title.
+        draws: Draws its content.
+        shows: Takes the effect; the panel is hidden while it returns None or False. None: it is always shown.
+        within: `end` of the panel that contains it; "": the first panel.
+        look: Other class attributes for Blender.
     """
 
     def poll(_cls: type[Panel], context: Context) -> bool:
@@ -116,7 +121,7 @@ def panel(
 
 
 def menu(name: str, label: str) -> Callable[[Callable[[UILayout, Context], None]], type[Menu]]:
-    """Make a menu SHUTTER_MT_name from a function that draws it."""
+    """Return a decorator that makes a menu class SHUTTER_MT_name from a function that draws it."""
 
     def made(draws: Callable[[UILayout, Context], None]) -> type[Menu]:
         def draw(self: Menu, context: Context) -> None:
@@ -129,7 +134,7 @@ def menu(name: str, label: str) -> Callable[[Callable[[UILayout, Context], None]
 
 @cache
 def _icons() -> ImagePreviewCollection:
-    """Return the icons of presets and patterns."""
+    """Make the icons of presets, under their names, and of patterns, under their numbers. They are made once."""
     icons = bpy.utils.previews.new()
     pictures = {name: _drawn(shutters.preset_bars(name, _WINDOW)) for name in shutters.PRESETS}
     pictures |= {str(index): _painted(index) for index in range(patterns.COUNT)}
@@ -141,17 +146,21 @@ def _icons() -> ImagePreviewCollection:
 
 
 def icon_of(name: str) -> int:
-    """Return the icon of a preset; 0 in the background."""
+    """Return the icon number of a preset, for `icon_value`; 0 in the background."""
     return _icons()[name].icon_id
 
 
 def pattern_icon(index: int) -> int:
-    """Return the icon of the pattern of the shutter at this index; 0 in the background."""
+    """Return the icon number of a shutter's pattern, for `icon_value`; 0 in the background.
+
+    Args:
+        index: Of the shutter.
+    """
     return icon_of(str(index % patterns.COUNT))
 
 
 def _drawn(bars: np.ndarray) -> np.ndarray:
-    """Return a picture (size, size, 4) of bars, bottom row first."""
+    """Return an icon (_SIZE, _SIZE, 4) float32 of bars, bottom row first."""
     picture = np.zeros((_SIZE, _SIZE, 4), dtype=np.float32)
     width = _SIZE // len(bars)
     picture[1, :] = 0.5
@@ -161,7 +170,7 @@ def _drawn(bars: np.ndarray) -> np.ndarray:
 
 
 def _painted(index: int) -> np.ndarray:
-    """Return a picture (size, size, 4) of a pattern, bottom row first."""
+    """Return an icon (_SIZE, _SIZE, 4) float32 of a pattern, bottom row first."""
     y, x = (np.mgrid[:_SIZE, :_SIZE] + 0.5) * _UNITS / _SIZE
     picture = np.ones((_SIZE, _SIZE, 4), dtype=np.float32)
     picture[..., :3] = patterns.painted(_LIGHT, index, x, y)

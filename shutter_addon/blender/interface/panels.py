@@ -1,4 +1,4 @@
-"""Panels, lists and menus in the sequencer's sidebar."""
+"""Panels, lists and menus of the Shutter tab in the sequencer's sidebar."""
 
 from collections.abc import Iterator
 
@@ -64,7 +64,7 @@ class SHUTTER_UL_regions(UIList):
             row.prop(layer, "annotation_hide", text="", emboss=False)
 
     def filter_items(self, _context: Context, effect: PropertyGroup, _property: str) -> tuple[list[int], list[int]]:
-        """Show only the regions of the active shutter."""
+        """Tell Blender to show only the regions that use the active shutter."""
         own = set(selection.own_regions(effect))
         return [self.bitflag_filter_item if i in own else 0 for i in range(len(effect.regions))], []
 
@@ -89,7 +89,10 @@ def shutter_menu(layout: UILayout, _context: Context) -> None:
 
 
 class SEQUENCER_PT_shutter(Panel):
-    """The first panel. It fits into Blender's default layout without scrolling."""
+    """The first panel of the Shutter tab: live preview, source, shutters, and buttons to draw and track.
+
+    It fits into Blender's default layout without scrolling.
+    """
 
     bl_label = "Shutter"
     bl_space_type = "SEQUENCE_EDITOR"
@@ -129,7 +132,7 @@ def _draw_header(self: Panel, context: Context) -> None:
 
 
 def _draw_exposure(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
-    """Draw how the active shutter exposes frames."""
+    """Draw the settings of how the active shutter exposes frames: preset, window, length and so on."""
     shutter = selection.active_shutter(effect)
     row = layout.row(align=True)
     preset = consistency.preset_of(effect, effect.active_shutter)
@@ -153,7 +156,7 @@ def _draw_exposure(layout: UILayout, scene: Scene, effect: PropertyGroup, strip:
 
 
 def _draw_bars(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
-    """Draw a summary of the active shutter's bars."""
+    """Draw a sentence about the active shutter's bars, such as their angle, or what is wrong with them."""
     try:
         bars, _states = bar_edits.shown(effect, effect.active_shutter)
     except EffectError as error:
@@ -183,7 +186,11 @@ def _draw_live(layout: UILayout, context: Context) -> None:
 
 
 def _notes(context: Context) -> Iterator[tuple[str, str]]:
-    """Yield notes on the active effect, each with the operator that helps, or ""."""
+    """Yield notes about the active effect, such as differences from its source.
+
+    Yields:
+        The sentence, and the bl_idname of an operator that helps, or "".
+    """
     scene, effect, strip = selection.active(context)
     if (newer := data_format.note([scene, *bpy.data.scenes])) is not None:
         yield newer, ""
@@ -203,14 +210,14 @@ def _notes(context: Context) -> Iterator[tuple[str, str]]:
 
 
 def _tracked(effect: PropertyGroup) -> list[int | None]:
-    """Return what may be tracked of the active region and shutter (selection.moving)."""
+    """Return what is active and may be tracked, as indices of selection.moving: a region, and None for the camera."""
     region = [effect.active_region] if selection.active_region(effect) is not None else []
     shutter = selection.active_shutter(effect)
     return region + ([None] if shutter is not None and shutter.follow == "CAMERA" else [])
 
 
 class SHUTTER_PT_notes(Panel):
-    """Notes on the effect. It is a popover, so that no button moves when notes come and go."""
+    """Notes about the effect and its tracking. It is a popover, so that no button moves when notes come and go."""
 
     bl_label = "Notes"
     bl_space_type = "TOPBAR"
@@ -267,7 +274,7 @@ def _draw_regions(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip
 
 
 def _draw_matte(layout: UILayout, region: PropertyGroup) -> None:
-    """Draw the matte's source and settings."""
+    """Draw where a region's matte comes from, and the settings of that."""
     layout.prop(region, "matte")
     if region.matte == "IMAGE":
         layout.template_ID(region, "image", open="image.open")

@@ -1,4 +1,4 @@
-"""The live preview: pictures, views, strokes and notes that a handler draws over the sequencer's picture."""
+"""The live preview: pictures, views, strokes and notes that a draw handler draws over the sequencer's picture."""
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -47,7 +47,7 @@ def _view_chosen(_settings: PropertyGroup, context: Context) -> None:
 
 
 def _redraw_when_still() -> float | None:
-    """Redraw after scrubbing or tracking ends, which Blender does not do."""
+    """Redraw once scrubbing or tracking has ended, which Blender does not do. This is a timer of Blender."""
     if previews.is_going(bpy.context):
         return _SOON
     preview_areas.redraw()
@@ -76,11 +76,11 @@ class _Settings:
 
 @with_fields(_Settings, live=_CHOSEN, view=_CHOSEN, split=_REDRAWN, probe=_REDRAWN, probe_at=_REDRAWN)
 class ShutterPreview(PropertyGroup):
-    """Settings of the live preview, in the window manager: not saved, without undo."""
+    """Settings of the live preview. They are in the window manager, so they are neither saved nor undone."""
 
 
 def _draw() -> None:
-    """Draw over a preview. This is the draw handler."""
+    """Draw everything over a preview. This is the draw handler, which Blender calls whenever it has drawn one."""
     context = bpy.context
     blender_gpu.free_unused()
     decision = previews.take_decision()
@@ -125,10 +125,12 @@ def _draw() -> None:
 
 
 def _show(context: Context, shown: Shown, decision: Decision | None, say: Say) -> None:
-    """Draw the effect, or a note why that is impossible.
+    """Draw the effect over its preview, or add a note why that is impossible.
 
     Args:
-        decision: what the engine was asked for.
+        shown: The effect strip that the preview shows.
+        decision: What the engine was asked for just before, and who draws it; None: it was not asked.
+        say: Adds a note.
     """
     try:
         quad = Quad(context.region, shown)
@@ -186,10 +188,12 @@ def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, s
 
 
 def _tell_detail(wanted: Drawing, size: tuple[int, int], say: Say) -> None:
-    """Add a note about how the preview is less than a render.
+    """Add a note about what a preview has less than a render: size, the footage itself, fine edges.
 
     Args:
-        size: of the rendered picture.
+        wanted: What is drawn.
+        size: Width and height of the rendered picture.
+        say: Adds the note.
     """
     source = wanted.renderer.source
     if previews.looking.whole is not None:
@@ -207,7 +211,7 @@ def _tell_detail(wanted: Drawing, size: tuple[int, int], say: Say) -> None:
 
 
 def _show_sharp(context: Context, shown: Shown | None) -> None:
-    """Draw notes and strokes over the source frame."""
+    """Draw a note and the strokes over the source frame that is shown for drawing (sharp_frame)."""
     with drawing.pixel_space(context.region), suppress(*effect_source.FAULTS):
         draw_notes(context.region, [rpt_("Sharp frame to draw on: the result appears after the stroke")])
         if shown is not None and not previews.pen_is_down():
@@ -217,7 +221,7 @@ def _show_sharp(context: Context, shown: Shown | None) -> None:
 
 
 def _show_strokes(context: Context, quad: Quad, shown: Shown, snapshot: Snapshot) -> None:
-    """Draw the strokes at their current place."""
+    """Draw the strokes of all regions where they are at the current frame, with their region's motion."""
     if not context.space_data.show_overlays:
         return
     frame = shown.scene.frame_current
@@ -234,7 +238,10 @@ def _show_strokes(context: Context, quad: Quad, shown: Shown, snapshot: Snapshot
 
 
 def _show_source(quad: Quad, shown: Shown, renderer: Renderer, request: Request, right: float) -> None:
-    """Draw the source frame from the left edge to `right`: the picture of a shutter that is open for it alone."""
+    """Draw the source frame from the picture's left edge to `right`, a fraction of its width.
+
+    It is composed by a shutter that is open for this frame alone.
+    """
     options = replace(request.state.options, step=1)  # reversed moments would come first
     still = np.zeros((1, options.window))
     still[0, options.before] = 1
@@ -248,7 +255,15 @@ def _show_source(quad: Quad, shown: Shown, renderer: Renderer, request: Request,
 def _show_shares(
     quad: Quad, step: str, colors: Colors, drawn: tuple[Texture, int], renderer: Renderer, opacity: float, **more
 ) -> None:
-    """Draw a picture of labels or coefficients in their colors."""
+    """Draw in the shutters' colors which shutter is drawn on each pixel (labels), or its shares of all (coefficients).
+
+    Args:
+        step: Pass of shaders/show.glsl that draws them; also the name of the view.
+        colors: Of the shutters, display values 0 to 1.
+        drawn: The texture, and the side in pixels of the blocks that share a texel.
+        opacity: 0 to 1.
+        more: Further constants of the pass.
+    """
     (texture, block), source = drawn, renderer.source
     rgba, size = np.ones((len(colors), 4), dtype=np.float32), (len(colors), 1)
     rgba[:, :3] = colors
@@ -259,7 +274,7 @@ def _show_shares(
 
 
 def draw_notes(region: Region, notes: list[str]) -> None:
-    """Draw sentences at the upper left of a region."""
+    """Draw sentences at the upper left of a preview's region, each broken into lines."""
     unit = drawing.ui_scale()
     left, right = 16 * unit, region.width - _NAVIGATION * unit
     lines = [line for note in notes for line in drawing.wrapped(note, right - left, drawing.SIZE)]

@@ -1,4 +1,4 @@
-"""Gizmos of the probe, which shows the shutter of a pixel, and of the handle of the split view."""
+"""Gizmos of the probe, which shows the shutter of the pixel under the pointer, and of the split view's handle."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -23,13 +23,18 @@ _MARK = (1.0, 1.0, 1.0, 0.9)
 
 
 def probed_at(renderer: Renderer, request: Request, point: Sequence[float]) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return a pixel's coefficients (N,), which sum to 1, and the bars (L,) of its shutter; None: there is no pixel.
+    """Return how a pixel is exposed: how much of each shutter it gets, and how much each frame counts for it.
 
-    It runs where Blender's GPU draws and reads one texel. Coefficients are solved only if something changed since they
-    were drawn.
+    To be called where Blender's GPU draws; one texel is read from it. The shares of shutters are computed again only if
+    something changed since they were drawn.
 
     Args:
-        point: fractions of the picture, y up.
+        point: In fractions of the picture, y up.
+
+    Returns:
+        The share of each shutter (N,), which sum to 1, and the weight of each frame (L,); None: the point is outside
+        the
+        picture.
     """
     source = renderer.source
     column, row = int(np.floor(point[0] * source.width)), int(np.floor((1 - point[1]) * source.height))
@@ -43,14 +48,18 @@ def probed_at(renderer: Renderer, request: Request, point: Sequence[float]) -> t
 
 
 def layout(point: Sequence[float], size: tuple[int, int], count: int, unit: float) -> tuple[Box, Box, list[float]]:
-    """Return the probe's box at a point of a region, the box of its bars, and the bottom of each line of text.
+    """Return where the probe and its parts are drawn, in pixels of the region.
 
     The box lies at the lower right of the point, or on the other side if there is no room.
 
     Args:
-        size: of the region.
-        count: lines of text.
-        unit: pixels per interface unit.
+        point: The point that is probed.
+        size: Width and height of the region.
+        count: Number of lines of text.
+        unit: Pixels per interface unit.
+
+    Returns:
+        The box around everything, the box of the bars, and the bottom of each line of text.
     """
     width, height = (_WIDTH + 2 * _PAD) * unit, (_HEIGHT + count * _LINE + 3 * _PAD) * unit
     x, y = point
@@ -64,7 +73,7 @@ def layout(point: Sequence[float], size: tuple[int, int], count: int, unit: floa
 
 
 def _view(context: Context) -> View | None:
-    """Return the view of the picture; None: it is not visible."""
+    """Return where the preview shows the effect's picture; None: it shows none, or too small."""
     if (shown := preview_areas.shown(context)) is None:
         return None
     seen = view(shown.effect, shown.strip, context.region)
@@ -72,7 +81,7 @@ def _view(context: Context) -> View | None:
 
 
 class SHUTTER_GT_probe(Gizmo):
-    """The probe. It follows the pointer and lets clicks through."""
+    """The probe: bars and shares of the pixel under the pointer. It lets clicks through."""
 
     def draw(self, context: Context) -> None:
         shown, at = preview_areas.shown(context), tuple(context.window_manager.virtual_shutter.probe_at)
@@ -89,7 +98,10 @@ class SHUTTER_GT_probe(Gizmo):
             _draw(context.region, point, shown.effect.shutters, *probed)
 
     def test_select(self, context: Context, location: tuple[int, int]) -> int:
-        """Follow the pointer: Blender calls this whenever it moves. No other callback leaves the events to others."""
+        """Note the pointer's position. Blender calls this whenever the pointer moves.
+
+        No other callback of a gizmo would leave the events to others.
+        """
         if (seen := _view(context)) is not None:
             x, y = location
             context.window_manager.virtual_shutter.probe_at = seen.on_picture(x + 0.5, y + 0.5)
@@ -97,7 +109,13 @@ class SHUTTER_GT_probe(Gizmo):
 
 
 def _draw(region: Region, point: Sequence, shutters: Sequence, shares: np.ndarray, mixed: np.ndarray) -> None:
-    """Draw the probe, with what `probed_at` has returned."""
+    """Draw the probe.
+
+    Args:
+        point: Probed point in pixels of the region.
+        shares: How much of each shutter the pixel gets (N,).
+        mixed: How much each frame counts for it (L,).
+    """
     unit = drawing.ui_scale()
     frame, bars, lines = layout(point, (region.width, region.height), len(shutters), unit)
     colors = np.array([shutter.color for shutter in shutters])

@@ -1,4 +1,4 @@
-"""Handles that move, rotate and scale the active region in the preview."""
+"""Gizmos in the preview: handles that move, rotate and scale the active region."""
 
 from typing import NamedTuple
 
@@ -27,8 +27,9 @@ class Place(NamedTuple):
     """Where a region's handles are at the current frame, in pixels of the preview's region.
 
     Attributes:
-        centre: the handle that moves the region.
-        corner: the handle that rotates and scales it.
+        centre: Point (2,) of the handle that moves the region.
+        corner: Point (2,) of the handle that rotates and scales it.
+        view: Where the preview shows the picture.
     """
 
     centre: np.ndarray
@@ -37,7 +38,10 @@ class Place(NamedTuple):
 
 
 def _strokes_now(scene: Scene, effect: PropertyGroup, strip: Strip) -> list[np.ndarray]:
-    """Return the active region's strokes, or the line of a ramp, without transform. Kept until something changes."""
+    """Return the active region's strokes (n, 2), or the line of a ramp, in fractions of the picture, before its motion.
+
+    They are kept until something changes.
+    """
     index, frame = effect.active_region, scene.frame_float
     region = effect.regions[index]
     if region.kind == "RAMP":
@@ -47,7 +51,7 @@ def _strokes_now(scene: Scene, effect: PropertyGroup, strip: Strip) -> list[np.n
 
 
 def place(context: Context) -> Place | None:
-    """Return the place of the active region's handles; None: no region is visible, or nothing is drawn in it."""
+    """Return where the handles of the active region are; None: no region is visible, or nothing is drawn in it."""
     seen = selection.in_picture(context)
     region = selection.active_region(seen[1]) if seen else None
     if region is None:
@@ -73,7 +77,7 @@ def place(context: Context) -> Place | None:
 
 
 class SHUTTER_GT_region(Dragged, Gizmo):
-    """A handle of the active region: it moves the region, or, if `turns`, rotates and scales it."""
+    """A handle of the active region: it moves the region or, with `turns`, rotates and scales it."""
 
     seen = staticmethod(place)
 

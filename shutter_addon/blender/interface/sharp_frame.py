@@ -1,4 +1,4 @@
-"""Show the source frame in the previews while the user draws: Blender's own picture, by its channel.
+"""While the user draws, show the source frame in the previews, by setting them to the channel of the source strip.
 
 It appears with *Draw* until the stroke is finished, and whenever the pen is down, because our draw handler would cover
 the stroke. The display channel is saved in files, so it is reset before saving. After the first stroke of a new effect,
@@ -17,7 +17,11 @@ _TOOLS = "builtin.annotate"  # prefix of the tools' names
 
 
 def take_up(context: Context, tool: str) -> bool:
-    """Activate a drawing tool in the previews until a stroke is finished. Return whether there is a preview."""
+    """Activate an annotation tool in the previews until a stroke is finished. Return whether there is a preview.
+
+    Args:
+        tool: Blender's name of it.
+    """
     before = context.workspace.tools.from_space_sequencer("PREVIEW", create=False)
     if before is None or not before.idname.startswith(_TOOLS):
         looking.pen.tool = before.idname if before else "builtin.select_box"
@@ -34,7 +38,7 @@ def _choose(context: Context, tool: str) -> bool:
 
 
 def show(context: Context) -> None:
-    """Show the active effect's source in previews that have its annotation.
+    """Show the active effect's source frame in the previews that have its annotation.
 
     Do nothing if the source is muted, or does not lie in the same meta strip as the effect.
     """
@@ -51,7 +55,7 @@ def show(context: Context) -> None:
 
 
 def give_back(context: Context) -> None:
-    """Show the result in the previews again."""
+    """Show the effect's result in the previews again, in place of the source frame."""
     for _window, area in preview_areas.previews(context) if looking.pen.channel else ():
         if area.spaces.active.display_channel == looking.pen.channel:
             area.spaces.active.display_channel = 0
@@ -59,13 +63,16 @@ def give_back(context: Context) -> None:
 
 
 def forget() -> None:
-    """Forget the pen before another file is loaded."""
+    """Show the result and forget the tool that was active before, when another file is loaded."""
     give_back(bpy.context)
     looking.pen.tool = ""
 
 
 def follow_pen() -> None:
-    """Notice the pen while a preview is drawn. Changes follow later, as drawing code must not change data."""
+    """Notice, while a preview is drawn, whether the pen went down or up, and show the source frame or the result.
+
+    The change is made later, by a timer, because drawing code must not change data.
+    """
     was_down, looking.pen.is_down = looking.pen.is_down, pen_is_down()
     if looking.pen.is_down and not looking.pen.channel:
         main_thread.later(_show)
@@ -74,12 +81,12 @@ def follow_pen() -> None:
 
 
 def is_shown(space: SpaceSequenceEditor) -> bool:
-    """Return whether a preview shows the source frame for the pen."""
+    """Tell whether a preview shows the source frame for drawing."""
     return bool(looking.pen.channel) and space.display_channel == looking.pen.channel
 
 
 def _tool_chosen() -> None:
-    """Show the result when the user activates another tool, which redraws no preview."""
+    """Show the result if the user has activated a tool that does not draw. Blender redraws no preview then."""
     tool = bpy.context.workspace.tools.from_space_sequencer("PREVIEW", create=False)
     if tool is not None and not tool.idname.startswith(_TOOLS):
         looking.pen.tool = ""
@@ -105,7 +112,7 @@ _OWNER = object()  # of the message bus subscription
 
 
 def listen() -> None:
-    """Subscribe to changes of the tool. Blender forgets this with every file that is opened."""
+    """Subscribe to changes of the active tool. To be called after each file is loaded, which ends subscriptions."""
     tools = bpy.types.WorkSpace, "tools"
     bpy.msgbus.clear_by_owner(_OWNER)
     bpy.msgbus.subscribe_rna(key=tools, owner=_OWNER, args=(), notify=_tool_chosen)

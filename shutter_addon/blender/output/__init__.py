@@ -1,1 +1,1 @@
-"""Films and pictures as files: writing, sharing among machines, joining and checking."""
+"""Write films, mattes and error reports, and check beforehand whether an edit can be rendered."""

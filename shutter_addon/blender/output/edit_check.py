@@ -1,4 +1,4 @@
-"""Checking whether an edit can be rendered on this machine, without rendering it."""
+"""Check whether an edit can be rendered on this machine, without rendering it."""
 
 import math
 from collections.abc import Iterator
@@ -18,13 +18,13 @@ from .film_output import OutputError
 
 
 def effects(scene: Scene, frames: range) -> tuple[list[str], list[str], set[Path]]:
-    """Check the effects that the scene's frames show, including those of scenes in it, each up to its first fault.
+    """Check all effects that are shown at these frames of a film, also in scenes inside it, each up to its first fault.
 
     Files are opened, and the first and last frames that are needed are read.
 
     Returns:
-        Faults, why the edit cannot be rendered; notes, what can be rendered, but not as one may expect; and the folders
-        to which the render writes mattes.
+        Faults: why the edit cannot be rendered. Notes: what can be rendered, but not as one may expect. The folders to
+        which the render will write mattes.
     """
     faults, notes, folders = list[str](), list[str](), set[Path]()
     # No GPU is needed, which would have to wait for its first picture, since only states and windows are read.
@@ -44,7 +44,11 @@ def effects(scene: Scene, frames: range) -> tuple[list[str], list[str], set[Path
 
 
 def _shown_effects(film: Scene, frames: range) -> Iterator[tuple]:
-    """Yield (scene, effect, strip, frames) of every effect that is shown at one of the film's frames."""
+    """Yield all effects that are shown at some of a film's frames.
+
+    Yields:
+        Scene, effect, its first effect strip, and the timeline frames of the scene at which it is shown.
+    """
     wanted = requirements.shown_scenes(film, frames)
     for scene, effect, parts in job_snapshots.shown_effects(film):
         shown: set[float] = set()
@@ -57,13 +61,14 @@ def _shown_effects(film: Scene, frames: range) -> Iterator[tuple]:
 
 
 def _notes(session: RenderSession, folders: set[Path], taken: snapshot.Snapshot) -> list[str]:
-    """Check an effect, and return notes.
+    """Check one effect, and return notes for the user about it.
 
     Args:
-        folders: Gets the folders of mattes that the render has to track.
+        folders: A set to which the folders of mattes that the render has to track are added.
+        taken: The effect's snapshot, at the frames to check.
 
     Raises:
-        OutputError, effect_source.FAULTS: The first fault.
+        OutputError, effect_source.FAULTS: The first fault that is found.
     """
     context = RenderContext(session)
     requests = [context.request(taken, frame) for frame in sorted(taken.frames)]
@@ -81,9 +86,12 @@ def _notes(session: RenderSession, folders: set[Path], taken: snapshot.Snapshot)
 
 
 def _check_footage(scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
-    """Raise a UserError if the footage is gone, or has changed since the edit was saved.
+    """Check that an effect's footage is there, and has the size and length that it had when the edit was saved.
 
-    The effect's scene has the size of the footage then.
+    The effect scene has the size of the footage then.
+
+    Raises:
+        UserError: It is gone, or has changed.
     """
     source = strips.source_of(scene, effect, strip)
     with source_media.open_media(source) as medium:
@@ -100,7 +108,15 @@ def _check_footage(scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
 
 
 def _check_readable(source: FrameSource, indices: set[int], step: int = 1) -> None:
-    """Raise MediaError if files of filmed frames are missing, or the first or last one cannot be decoded."""
+    """Check that the files of some frames exist, and that the first and the last of the frames can be decoded.
+
+    Args:
+        indices: Frames of the footage, from 0.
+        step: Moments from a frame of the footage to the next, which the source counts as frames.
+
+    Raises:
+        MediaError: A file is missing, or a frame cannot be decoded.
+    """
     files = source.files
     for path in sorted({files[index] for index in indices}) if len(files) > 1 else ():
         check_file(path)
@@ -109,10 +125,13 @@ def _check_readable(source: FrameSource, indices: set[int], step: int = 1) -> No
 
 
 def _lacking_mattes(source: FrameSource, requests: list[Request], folders: set[Path]) -> int:
-    """Return the number of mattes that have to be tracked. MediaError: a matte cannot be read.
+    """Check that the mattes of requested pictures can be read, and return how many of them have yet to be tracked.
 
     Args:
-        folders: Gets the folders that keep them.
+        folders: A set to which the folders are added where these will be kept.
+
+    Raises:
+        MediaError: A matte cannot be read.
     """
     shown: dict = {}
     lacking = 0

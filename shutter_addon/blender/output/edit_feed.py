@@ -1,4 +1,4 @@
-"""Feeding finished 8-bit levels to renders of the user's edit, through a file.
+"""Give Blender finished 8-bit pictures of an effect through a file, which is faster than through the render engine.
 
 Where only an effect is visible, Blender would convert the engine's floats to levels in several passes and blend them
 over hidden footage, which takes several times as long as showing a strip of footage. So a temporary strip on top shows
@@ -32,14 +32,14 @@ _ROWS, _COLUMNS = 64, 16
 
 @dataclass
 class _Film:
-    """The changes of a render.
+    """How a render has changed the edit.
 
     Attributes:
-        scene: session_uid of the edit.
-        changed: Restores the edit.
-        strip: Name of the file's strip; None: not added yet.
+        scene: session_uid of the edit's scene.
+        changed: Undoes the changes when it is closed.
+        strip: Name of the temporary strip that shows the file; None: not added yet.
         file: The file of levels; None: not made yet.
-        makes_levels: The result of sole_effect.has_known_levels; None: unknown.
+        makes_levels: What sole_effect.has_known_levels returned; None: not asked yet.
         has_begun: Whether a frame was rendered.
     """
 
@@ -52,21 +52,24 @@ class _Film:
 
 
 def begin(scene: Scene) -> None:
-    """Begin the render of an edit, on the main thread."""
+    """When a render of an edit begins, prepare to give it finished pictures. Only in renders without a window."""
     end()
     if render_job.where() is Where.BACKGROUND and scene.sequence_editor is not None:
         render_job.job.film_data.feed = _Film(scene.session_uid)
 
 
 def end() -> None:
-    """Restore the edit."""
+    """Remove the temporary strip and restore the edit."""
     film, render_job.job.film_data.feed = render_job.job.film_data.feed, None
     if film is not None:
         film.changed.close()
 
 
 def before_frame(scene: Scene) -> None:
-    """Prepare the edit for its current frame."""
+    """Before each frame of a render: write its levels to the file and show the file's strip, if that is possible.
+
+    Otherwise the strip is hidden, and Blender asks the engine.
+    """
     film = render_job.job.film_data.feed
     if film is None or film.scene != scene.session_uid:
         return
@@ -83,7 +86,15 @@ def before_frame(scene: Scene) -> None:
 
 
 def _feed(film: _Film, scene: Scene, strip: Strip, is_blended: bool) -> bool:
-    """Write the effect's levels to the file. Return False if the engine has to render the frame, and report errors."""
+    """Make the effect's picture at the scene's current frame, and write its levels to the file.
+
+    Args:
+        strip: The effect strip that alone is visible.
+        is_blended: Whether Blender would blend it with one below.
+
+    Returns:
+        False if the engine has to render the frame, and report what is wrong.
+    """
     try:
         shown = scene.frame_current - strips.origin(strip) + strip.scene.frame_start
         snapshot, frame = job_snapshots.of(strip.scene, int(shown))
@@ -107,7 +118,7 @@ def _feed(film: _Film, scene: Scene, strip: Strip, is_blended: bool) -> bool:
 
 
 def _file(film: _Film, scene: Scene) -> "LevelsFile":
-    """Return the film's file, with a strip that shows it.
+    """Return the file of levels. The first time, make it, and add a strip that shows it.
 
     Raises:
         OSError: It cannot be written.
@@ -147,10 +158,14 @@ def _add_strip(film: _Film, scene: Scene, path: Path) -> str:
 
 
 class LevelsFile:
-    """An uncompressed TIFF of RGBA levels, whose pixels are overwritten in place."""
+    """An uncompressed TIFF of 8-bit RGBA pixels, which are overwritten in place for each frame."""
 
     def __init__(self, path: Path, width: int, height: int) -> None:
-        """Create the file with room for all later writes. OSError: it cannot be written."""
+        """Create the file with room for all later pictures.
+
+        Raises:
+            OSError: It cannot be written.
+        """
         self.path, self._padding = path, -width % _COLUMNS
         columns = width + self._padding
         spec = OpenImageIO.ImageSpec(width, height, 4, "uint8")
@@ -166,10 +181,10 @@ class LevelsFile:
         self._file = path.open("r+b", buffering=0)
 
     def write(self, levels: np.ndarray) -> None:
-        """Write levels uint8 (H, W, 4), top row first.
+        """Overwrite the pixels with levels, uint8 (H, W, 4), top row first.
 
         Raises:
-            OSError: The file is gone. Blender would show it as a single colour.
+            OSError: The file is gone. Blender would show it as a single color.
         """
         if self._padding:
             levels = np.pad(levels, ((0, 0), (0, self._padding), (0, 0)))

@@ -1,6 +1,6 @@
-"""Reports of errors as short Markdown: versions, the device, the edit's parts, and the last errors and warnings.
+"""Reports of errors, which users send: versions, the device, what the edit consists of, the last errors and warnings.
 
-They contain no names of strips, scenes, files or folders of the user.
+They are short Markdown, and contain no names of strips, scenes, files or folders of the user.
 """
 
 import importlib
@@ -26,7 +26,11 @@ PACKAGES = "numpy", "OpenImageIO", "av", "cv2", "moderngl"
 
 
 def text(scene: Scene | None) -> str:
-    """Return the report, on the main thread; `scene` is the sequencer's, or None."""
+    """Return the report. To be called on the main thread.
+
+    Args:
+        scene: The sequencer's scene, to describe; None: none.
+    """
     lines = ["### Virtual Shutter: report of an error", ""]
     for part in (_versions, _device, partial(_edit, scene)):
         try:
@@ -68,15 +72,15 @@ def _device() -> Iterator[str]:
 
 
 def without_paths(words: str) -> str:
-    """Remove paths from a message of a driver or a library.
+    """Return a message of a driver or a library with "(path)" in place of paths.
 
-    Everything from the first path's beginning to the last path's end goes, since folders' names can have spaces.
+    Everything from the first path's beginning to the last path's end is replaced, since folders' names can have spaces.
     """
     return re.sub(r"(?<!\w)(?:[A-Za-z]:)?[\\/~](?:.*[\\/])?\S*", "(path)", words)
 
 
 def _edit(scene: Scene | None) -> Iterator[str]:
-    """Describe an edit by kinds and numbers."""
+    """Yield lines that describe an edit by types and numbers, without names."""
     if scene is None:
         return
     render, version = scene.render, ".".join(map(str, bpy.data.version))
@@ -104,7 +108,7 @@ def _effect(scene: Scene, effect: PropertyGroup, strip: Strip) -> Iterator[str]:
 
 
 def _options(group: PropertyGroup) -> str:
-    """Describe the enums, switches and integers of a property group that differ from their defaults."""
+    """Return the choices, switches and integers of a property group that differ from their defaults, as a text."""
     words = []
     for prop in group.bl_rna.properties:
         name = prop.identifier

@@ -1,4 +1,4 @@
-"""Writing films as movies or folders of pictures, each file whole or not at all."""
+"""Write films as movies or as folders of pictures, each file whole or not at all."""
 
 import itertools
 import os
@@ -42,11 +42,11 @@ _STAMPS = (
 
 
 class OutputError(UserError, ValueError):
-    """A film cannot be written. The message is one sentence."""
+    """A film cannot be written. The message is one sentence for the user."""
 
 
 class InterruptedRenderError(OutputError):
-    """The user or a farm stopped the render. The message says what is left."""
+    """The user or a render farm stopped the render. The message says what is finished."""
 
 
 def is_movie(path: Path) -> bool:
@@ -54,13 +54,22 @@ def is_movie(path: Path) -> bool:
 
 
 def size(scene: Scene) -> tuple[int, int]:
-    """Return width and height of the pictures that Blender renders of a scene, in pixels."""
+    """Return width and height in pixels of the pictures that Blender renders of a scene."""
     render = scene.render
     return tuple(n * render.resolution_percentage // 100 for n in (render.resolution_x, render.resolution_y))
 
 
 def check(path: Path, file_format: str | None, size: tuple[int, int]) -> None:
-    """Raise OutputError if Blender cannot write a film of this size to `path`. A missing folder is no error."""
+    """Check that Blender can write a film to a path. A missing folder is no error.
+
+    Args:
+        path: A movie, or a folder of pictures.
+        file_format: The option --format, which is for a folder; None: not given.
+        size: Width and height of the pictures in pixels.
+
+    Raises:
+        OutputError: It cannot.
+    """
     width, height = size
     if width < 4 or height < 4:
         raise OutputError(f"the source has {width}×{height} pixels; Blender renders no picture smaller than 4×4")
@@ -76,13 +85,27 @@ def check(path: Path, file_format: str | None, size: tuple[int, int]) -> None:
 
 
 def check_folder(path: Path, file_format: str | None) -> None:
-    """Raise OutputError if the path looks like a file of another kind and no format tells that it is a folder."""
+    """Check that a path can be meant as a folder of pictures.
+
+    Args:
+        file_format: The option --format, with which any path is a folder; None: not given.
+
+    Raises:
+        OutputError: It looks like a file of another kind.
+    """
     if path.suffix.strip(".") and not path.is_dir() and file_format is None:
         raise OutputError(f"{path}: neither a folder nor one of {', '.join(MOVIES)}")
 
 
 def check_movie(output: Path, read: list[Path]) -> None:
-    """Raise OutputError if a path has no movie's suffix, is not one for Blender, or is one of the files in `read`."""
+    """Check that a path can be that of a new movie.
+
+    Args:
+        read: Files that must not be overwritten.
+
+    Raises:
+        OutputError: It has no movie's suffix, Blender cannot use it, or it is one of `read`.
+    """
     if not is_movie(output):
         raise OutputError(f"{output}: none of {', '.join(MOVIES)}")
     blender_path(str(output))
@@ -90,7 +113,11 @@ def check_movie(output: Path, read: list[Path]) -> None:
 
 
 def check_writable(folder: Path) -> None:
-    """Raise OutputError if a folder, or the first existing one above, cannot be written to."""
+    """Check that files can be written to a folder, or if it is missing, to the first folder above that exists.
+
+    Raises:
+        OutputError: They cannot.
+    """
     place = next(path for path in (folder, *folder.parents) if path.exists())
     if not place.is_dir():
         raise OutputError(f"{place}: is a file, not a folder")
@@ -102,7 +129,15 @@ def check_writable(folder: Path) -> None:
 
 
 def refuse_overwriting(written: Iterable[Path], read: Collection[Path]) -> None:
-    """Raise OutputError if a file to write is one that is read, also through links, or is written twice."""
+    """Check that no file will be written twice or over one that is read, also through links.
+
+    Args:
+        written: Files that will be written.
+        read: Files that will be read.
+
+    Raises:
+        OutputError: One will.
+    """
     taken = {_identity(path): path for path in read}
     places = set()
     for path in written:
@@ -115,7 +150,7 @@ def refuse_overwriting(written: Iterable[Path], read: Collection[Path]) -> None:
 
 
 def _identity(path: Path) -> tuple[int, int] | str:
-    """Return a value that is equal for all paths to a file, or to a place without a file."""
+    """Return a value that is equal for all paths that lead to the same file, or to the same place without a file."""
     try:
         status = os.stat(path)
     except OSError:
@@ -124,21 +159,27 @@ def _identity(path: Path) -> tuple[int, int] | str:
 
 
 def pictures_of(folder: Path, ending: str, frames: range) -> list[Path]:
-    """Return the files of these frames in a folder."""
+    """Return the paths of the pictures of these frames in a folder, such as 0001.png."""
     return [folder / f"{frame:04d}.{ending}" for frame in frames]
 
 
 def blender_path(path: str) -> str:
-    """Return the path with braces escaped, which Blender uses for templates. OutputError: Blender cannot use it."""
+    """Return a path with its braces doubled, since Blender takes single ones for templates.
+
+    Raises:
+        OutputError: Blender cannot write to the path.
+    """
     if os.sep == "/" and "\\" in path:
         raise OutputError(f"{path}: Blender cannot write to a path with \\")
     return path.replace("{", "{{").replace("}", "}}")
 
 
 def set_output(scene: Scene, path: Path, file_format: str, *, alpha: bool) -> None:
-    """Set the edit's output: a movie by its suffix, else a folder of pictures named by frame.
+    """Set a scene's output to a path and choose the formats: a movie by its suffix, else a folder of pictures.
 
     Args:
+        path: A movie, or a folder of pictures that are named by frame.
+        file_format: A key of FORMATS, for pictures.
         alpha: Whether pictures keep the source's transparency.
 
     Raises:
@@ -160,14 +201,23 @@ def set_output(scene: Scene, path: Path, file_format: str, *, alpha: bool) -> No
 
 
 def set_place(render: RenderSettings, path: Path) -> None:
-    """Set the output's path, without metadata about the render. OutputError: Blender cannot write there."""
+    """Set the path of the output, and turn off metadata about the render.
+
+    Raises:
+        OutputError: Blender cannot write there.
+    """
     render.use_file_extension = not is_movie(path)
     _stamp_nothing(render)
     render.filepath = blender_path(str(path) if is_movie(path) else f"{path}{os.sep}")
 
 
 def set_pictures(scene: Scene, file_format: str, note: str) -> None:
-    """Set up pictures of a saved edit: all frames, with the edit's colours, and a note in their metadata."""
+    """Set a scene's output to pictures of every frame, with the edit's color settings and a note in their metadata.
+
+    Args:
+        file_format: A key of FORMATS.
+        note: Text by which the pictures are recognized later.
+    """
     settings, render = scene.render.image_settings, scene.render
     settings.media_type = "IMAGE"
     _set_format(settings, file_format)
@@ -186,18 +236,18 @@ def _set_format(settings: ImageFormatSettings, file_format: str) -> None:
 
 
 def _stamp_nothing(render: RenderSettings) -> None:
-    """Write no time or place of the render into pictures, so that equal pixels are equal files."""
+    """Keep date, host and the like out of pictures' metadata, so that equal pixels give equal files."""
     for name in _STAMPS:
         setattr(render, name, False)
 
 
 def render_made_edit(scene: Scene, output: Path) -> None:
-    """Render an edit of render_command.make_edit to a movie or a folder.
+    """Render an edit that render_command.make_edit has made to a movie or a folder of pictures, with a progress bar.
 
     Raises:
         OutputError: It cannot be rendered or written. Finished pictures stay, and the finished part of a movie under
             another name.
-        InterruptedRenderError: The same, by Ctrl-C or a farm's TERM.
+        InterruptedRenderError: The same, after Ctrl-C or a farm's TERM.
     """
     make_folder(output.parent if is_movie(output) else output)
     # Mute sources, which their effects cover completely. Blender takes Scene strips for transparent: it would decode
@@ -208,16 +258,17 @@ def render_made_edit(scene: Scene, output: Path) -> None:
 
 
 def render_frames(scene: Scene, output: Path, moved: Callable[[], None], move: Move = Path.replace) -> None:
-    """Render the frames of an edit to a movie, or to pictures in a prepared folder by the edit's settings.
+    """Render the frames of an edit to a movie, or to pictures in a folder that exists, by the edit's settings.
 
     Blender writes into a folder beside the output, from which finished files are moved.
 
     Args:
+        output: The movie or the folder.
         moved: Called after each frame. It may raise to end the render.
-        move: Moves a picture to its place. It may raise to end the render.
+        move: Called with a finished picture and its final path, to move it. It may raise to end the render.
 
     Raises:
-        OutputError, InterruptedRenderError: See `render_made_edit`.
+        OutputError, InterruptedRenderError: As in `render_made_edit`.
     """
     is_film = is_movie(output)
     faults: list[str] = []
@@ -251,13 +302,21 @@ def render_frames(scene: Scene, output: Path, moved: Callable[[], None], move: M
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder and remove abandoned parts in it. OSError: it cannot be made."""
+    """Make a folder, and remove from it what processes that have ended left unfinished.
+
+    Raises:
+        OSError: It cannot be made.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     atomic_write.clear_up(folder)
 
 
 def _rescued(part: Path, output: Path) -> str:
-    """Keep the finished part of a movie beside its output. Return the end of a sentence that says so, or ""."""
+    """Keep the finished part of a movie beside its output, under a new name.
+
+    Returns:
+        The end of a sentence that says so; "": no frame is finished, or it cannot be kept.
+    """
     count = whole_pictures(part)
     if count == 0:
         return ""
@@ -272,19 +331,20 @@ def _rescued(part: Path, output: Path) -> str:
 
 
 def message(error: RuntimeError) -> str:
-    """Return Blender's message on one line, without "Error: "."""
+    """Return the text of an error that Blender raised, on one line, without "Error: "."""
     return " ".join(str(error).removeprefix("Error: ").split())
 
 
 @contextmanager
 def _moved(part: Path, output: Path, scene: Scene, update: Callable[[], None], move: Move) -> Iterator[dict[str, Path]]:
-    """Move finished pictures from `part` to `output` after each frame.
+    """Move finished pictures from the folder `part` to `output` after each frame, within a `with` block.
 
     Args:
-        update, move: May raise to end the render.
+        update: Called after each frame.
+        move: Called with a finished picture and its final path. Either may raise to end the render.
 
     Yields:
-        The missing pictures by name; empty for a movie.
+        The pictures that are still missing, by name; empty for a movie.
     """
     frames = range(scene.frame_start, scene.frame_end + 1)
     settings = scene.render.image_settings
@@ -308,7 +368,15 @@ def _moved(part: Path, output: Path, scene: Scene, update: Callable[[], None], m
 
 @contextmanager
 def progress(count: int, unit: str) -> Iterator[Callable]:
-    """Show a progress bar on a terminal. Yield a function that advances it, by 1 unless told otherwise."""
+    """Show a progress bar on a terminal within a `with` block.
+
+    Args:
+        count: Steps of the whole.
+        unit: What a step is called.
+
+    Yields:
+        A function that advances the bar, by one step or by its argument.
+    """
     try:
         from tqdm import tqdm
     except ImportError:  # the extension was copied without its wheels
@@ -320,12 +388,13 @@ def progress(count: int, unit: str) -> Iterator[Callable]:
 
 @contextmanager
 def stoppable() -> Iterator[list[int]]:
-    """End the render after the current frame on Ctrl-C or a farm's TERM, so that a movie is closed properly.
+    """End the render after the current frame on Ctrl-C or a farm's TERM, within a `with` block.
 
-    A second signal ends it immediately. No exception passes through Blender, which prints it and renders on.
+    So movie files are closed properly. A second signal ends the process at once. No exception passes through Blender,
+    which would print it and render on.
 
     Yields:
-        A list that gets the signal.
+        A list to which the signal's number is added.
     """
     signals: list[int] = []
 
@@ -345,7 +414,7 @@ def stoppable() -> Iterator[list[int]]:
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Keep Blender's log of every saved frame off the terminal. Errors are raised as exceptions."""
+    """Keep Blender's log of every saved frame off the terminal within a `with` block. Errors are still raised."""
     if sys.stdout is not None:
         with suppress(OSError):  # the reader has gone
             sys.stdout.flush()

@@ -1,5 +1,4 @@
-"""Writing mattes of an effect as pictures: beside its recipe, which needs files for strips and masks, or for other
-programs."""
+"""Write an effect's mattes as pictures: for its recipe, which needs files of them, or for other programs."""
 
 import os
 import re
@@ -26,7 +25,9 @@ EffectStrip = tuple[Scene, PropertyGroup, Strip]
 
 
 def recipe_for(scene: Scene, effect: PropertyGroup, strip: Strip, path: Path) -> Effect:
-    """Return an effect as a recipe for a path. Mattes without a file are written beside it, into "NAME mattes".
+    """Return an effect as a recipe that will be saved at `path`. Write mattes that have no file beside it.
+
+    They are written into the folder "NAME mattes".
 
     Raises:
         effect_source.FAULTS: The effect cannot be rendered, or a matte cannot be read or written.
@@ -41,9 +42,15 @@ def recipe_for(scene: Scene, effect: PropertyGroup, strip: Strip, path: Path) ->
 
 
 def save(scene: Scene, effect: PropertyGroup, strip: Strip, region: PropertyGroup, folder: Path, suffix: str) -> int:
-    """Write a matte, ramp or outline at each timeline frame of the effect strip, all or none, and return their number.
+    """Write a matte, ramp or outline as a picture for each timeline frame of the effect strip, all or none.
 
-    Files are FRAME.png, 16-bit grey, or FRAME.exr, float, with the channel Y.
+    Args:
+        region: The matte, ramp, outline or subject.
+        folder: Where pictures are written, named by timeline frame.
+        suffix: "png" for 16-bit grey, or "exr" for float with the channel Y.
+
+    Returns:
+        The number of pictures.
 
     Raises:
         effect_source.FAULTS: The matte cannot be read, or the pictures cannot be written.
@@ -63,7 +70,12 @@ def _ramp(region: PropertyGroup) -> RampContent:
 
 
 def _folder(region: PropertyGroup, path: Path, number: int) -> Path | None:
-    """Return the folder for a matte's pictures; None: a recipe can refer to it without."""
+    """Return the folder for the pictures of a region's matte; None: a recipe needs none, as for ramps and files.
+
+    Args:
+        path: Of the recipe.
+        number: Of the region, for the folder's name.
+    """
     if region.kind == "RAMP" or (region.matte == "IMAGE" and not _is_one_of_many(region)):
         return None
     name = re.sub(r"[^\w. -]", "_", region.name).strip(". ") or "Matte"
@@ -71,13 +83,13 @@ def _folder(region: PropertyGroup, path: Path, number: int) -> Path | None:
 
 
 def _is_one_of_many(region: PropertyGroup) -> bool:
-    """Return whether a matte is a single picture that a recipe would read as the first of a sequence."""
+    """Tell whether a matte is a single picture that a recipe would take for the first of an image sequence."""
     path = matte_content.image_path(region)
     return region.image.source == "FILE" and path.exists() and len(sequence_files(path)) > 1
 
 
 def _read_files(scene: Scene, effect: PropertyGroup, strip: Strip) -> Iterator[Path]:
-    """Yield a file of each medium that the effect's mattes and source read."""
+    """Yield one file of each movie or image sequence that the effect's mattes and source read."""
     yield source_media.spec(strips.source_of(scene, effect, strip)).path
     for region in _mattes(effect):
         if region.kind == "MATTE" and region.matte == "IMAGE":
@@ -87,7 +99,15 @@ def _read_files(scene: Scene, effect: PropertyGroup, strip: Strip) -> Iterator[P
 
 
 def _refuse_overwriting(folders: list[Path | None], *shown: Any) -> None:
-    """Raise EffectError if pictures would be written where the effect reads others. `shown` is as in _read_files."""
+    """Check that pictures are not written into a folder from which the effect reads others.
+
+    Args:
+        folders: Where pictures will be written; None: none.
+        shown: Arguments of _read_files.
+
+    Raises:
+        EffectError: They would be.
+    """
     taken = {file.parent.resolve() for file in _read_files(*shown)}
     for folder in folders:
         if folder is not None and folder.resolve() in taken:
@@ -109,7 +129,15 @@ def _content(shown: EffectStrip, region: PropertyGroup, folder: Path | None, pat
 
 
 def _write(shown: EffectStrip, region: PropertyGroup, folder: Path, first: int, suffix: str = "png") -> int:
-    """Write a matte at each timeline frame of the effect strip, numbered from `first`, all or none."""
+    """Write a matte as a picture for each timeline frame of the effect strip, all or none.
+
+    Args:
+        first: Number of the first picture's name.
+        suffix: "png" or "exr".
+
+    Returns:
+        The number of pictures.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     frames = range(shown[2].left_handle, shown[2].right_handle)
     taken = snapshot.take(*shown, frames)

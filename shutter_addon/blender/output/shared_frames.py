@@ -1,4 +1,4 @@
-"""Rendering frames of a saved edit into a folder that several machines share, each frame once."""
+"""Render frames of a saved edit into a folder that several machines share, so that each frame is rendered once."""
 
 import time
 from collections.abc import Callable
@@ -20,11 +20,15 @@ _PAUSE = 1.0  # seconds between checks of what others have finished
 
 
 def check(folder: Path, file_format: str | None, frames: range, read: list[Path]) -> None:
-    """Raise OutputError if an edit's frames cannot be rendered there.
+    """Check that an edit's frames can be rendered to a folder.
 
     Args:
-        file_format: None for PNG, if the folder cannot be mistaken for a file.
+        file_format: The option --format; None: not given, which means PNG.
+        frames: Timeline frames to render.
         read: Files that must not be overwritten.
+
+    Raises:
+        OutputError: They cannot.
     """
     if film_output.is_movie(folder):
         raise film_output.OutputError(f"{folder}: a saved edit is rendered to a folder of pictures, not to a movie")
@@ -34,20 +38,27 @@ def check(folder: Path, file_format: str | None, frames: range, read: list[Path]
 
 
 def check_resumable(scene: Scene) -> None:
-    """Raise OutputError if pictures cannot carry the edit's version."""
+    """Check that the edit's pictures can carry a note of its version, by which --resume recognizes finished ones.
+
+    Raises:
+        OutputError: They cannot, because the edit burns metadata in.
+    """
     if scene.render.use_stamp:
         why = "the edit burns metadata into its pictures, so that they carry no version; turn Burn Into Image off"
         raise film_output.OutputError(f"--resume: {why}")
 
 
 def render(scene: Scene, folder: Path, file_format: str, version: EditVersion, *, resume: bool) -> None:
-    """Render all frames of the edit to pictures that carry the key of its version.
+    """Render all frames of an edit to pictures that carry the key of the edit's version.
 
     Args:
+        scene: The edit's scene, whose frame range is rendered.
+        file_format: A key of film_output.FORMATS.
+        version: The edit's version.
         resume: Skip finished frames, and wait for frames that other processes render, until these finish or give up.
 
     Raises:
-        OutputError, InterruptedRenderError: See film_output.render_made_edit, or the folder's job has changed.
+        OutputError, InterruptedRenderError: As in film_output.render_made_edit, or another version is rendered there.
         OSError: The folder cannot be written to.
     """
     if resume:
@@ -92,9 +103,14 @@ def _resume(scene: Scene, folder: Path, missing: dict[int, Path], key: str, writ
 
 
 def _claim_run(claims: Claims, missing: dict[int, Path], key: str, moved: Callable) -> list[int]:
-    """Claim the first missing frames without a gap. Return them; empty if others have claimed all.
+    """Claim a few missing frames without a gap for this process, and return them; []: others have claimed all.
 
-    Frames before these that are finished are no longer missing.
+    Frames that turn out to be finished are removed from `missing`.
+
+    Args:
+        missing: Paths of the missing pictures, by frame.
+        key: Of the edit's version, which finished pictures carry.
+        moved: Called for each finished frame.
     """
     run: list[int] = []
     for frame, picture in list(missing.items()):
@@ -114,5 +130,5 @@ def _claim_run(claims: Claims, missing: dict[int, Path], key: str, moved: Callab
 
 
 def _name(picture: Path) -> str:
-    """Return the name of a picture's claim."""
+    """Return the name under which a picture is claimed."""
     return f"{picture.stem}_{picture.suffix[1:]}"

@@ -1,1 +1,1 @@
-"""From an effect to its pictures and films: engine, devices, sessions, render jobs."""
+"""Make the pictures of effects: the render engine, sessions on devices, previews, render jobs."""

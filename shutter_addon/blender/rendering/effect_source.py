@@ -1,4 +1,8 @@
-"""The footage that a renderer reads for an effect, with moments between frames, at a preview's size."""
+"""Open the footage of an effect for a renderer, with interpolated moments between frames, at a preview's size.
+
+With *Smooth*, moments are computed between the frames of the footage. A source then counts several steps from one frame
+of the footage to the next.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +29,7 @@ FAULTS = (EffectError, MediaError, NoDeviceError, MemoryError)
 
 
 def in_words(error: BaseException) -> str:
-    """Return a sentence for an error that ended a picture. Unexpected ones are kept for a report."""
+    """Return a sentence for the user about an error that ended a picture. *Copy Report* keeps unexpected ones."""
     if isinstance(error, FAULTS):
         return str(error) or "not enough memory"
     if isinstance(error, KeyboardInterrupt):
@@ -39,12 +43,12 @@ def in_words(error: BaseException) -> str:
 
 @dataclass(frozen=True)
 class Detail:
-    """How much detail a preview has.
+    """How detailed a picture is; previews have less detail than renders.
 
     Attributes:
-        divisor: How many times smaller than the source the picture is each way (media.open_source).
-        proxy: Where frames are read from, if it fits.
-        smooth: Whether moments between frames are exposed, too.
+        divisor: How many times smaller than the source the picture is in width and height (media.open_source).
+        proxy: The proxy that frames are read from, if it fits the footage; None: the footage.
+        smooth: Whether moments between the footage's frames are exposed, too, if the effect wants that.
     """
 
     divisor: int = 1
@@ -63,12 +67,12 @@ class SourceKey:
     """What a renderer reads, as plain data: equal keys read the same frames for the same effect.
 
     Attributes:
-        scene: session_uid of the effect's scene.
+        scene: session_uid of the effect scene.
         spec: The footage.
-        steps: Steps from a filmed frame to the next.
-        skip_repeats: As in Options, if there are steps.
-        detail: `smooth` is also set where only filmed frames can be had.
-        folder: Where vectors are stored; None: nowhere.
+        steps: Steps from a frame of the footage to the next; 1: no moments between.
+        skip_repeats: As in Options, if there are moments.
+        detail: Its `smooth` is True also for an effect that has no moments, so that its key does not depend on it.
+        folder: Folder in which optical flow vectors are stored; None: nowhere.
     """
 
     scene: int
@@ -80,7 +84,11 @@ class SourceKey:
 
     @staticmethod
     def of(snapshot: Snapshot, detail: Detail = FULL) -> SourceKey:
-        """Return the key of a snapshot. EffectError, MediaError: the steps cannot be found."""
+        """Return the key for an effect in pictures of some detail.
+
+        Raises:
+            EffectError, MediaError: The footage cannot be read to find the steps.
+        """
         steps = find_steps(snapshot) if detail.smooth else 1
         if known_steps(snapshot) == 1:
             detail = replace(detail, smooth=True)
@@ -89,18 +97,18 @@ class SourceKey:
 
     @property
     def place(self) -> tuple[int, bool]:
-        """The place of its renderer: an effect has one for plain and one for smooth pictures."""
+        """Where a session keeps its renderer: an effect has one with moments between frames, and one without."""
         return self.scene, self.steps > 1
 
     def open(self, *, planes: bool = False, keeps: bool = False) -> ShotSource:
-        """Open the source.
+        """Open the footage.
 
         Args:
-            planes: As in PrefetchSource.
-            keeps: Write vectors to the folder.
+            planes: Give frames as the decoder's planes where only their conversion is missing, as in PrefetchSource.
+            keeps: Write newly computed optical flow vectors to `folder`.
 
         Raises:
-            EffectError, MediaError: There is none.
+            EffectError, MediaError: It cannot be read.
         """
         medium = self.spec.open(self.detail.divisor, self.detail.proxy)
         if self.steps == 1:
@@ -115,16 +123,16 @@ class SourceKey:
 
 
 def known_steps(snapshot: Snapshot) -> int | None:
-    """Return an effect's steps from a filmed frame to the next; None: find_steps has not found them yet."""
+    """Return an effect's steps from a frame of the footage to the next; None: find_steps has not found them yet."""
     key = steps_key(snapshot)
     return 1 if key[1] == 1 else _steps.get(key)
 
 
 def find_steps(snapshot: Snapshot) -> int:
-    """Return the steps as known_steps. This may compare frames.
+    """Return an effect's steps from a frame of the footage to the next. It may take long, to compare frames.
 
     Raises:
-        EffectError, MediaError: They cannot be read.
+        EffectError, MediaError: The footage cannot be read.
     """
     key = steps_key(snapshot)
     _source, smooth, window, skip_repeats = key
@@ -137,28 +145,42 @@ def find_steps(snapshot: Snapshot) -> int:
 
 
 def steps_of(medium: FrameSource, smooth: int | str, window: int, *, skip_repeats: bool) -> int:
-    """Return the steps that the feature `smooth` finds for a source (smooth.steps_for), or 1 without that feature."""
+    """Return the steps from a frame of the footage to the next that the feature `smooth` finds; 1 without that feature.
+
+    Args:
+        smooth: The effect's option *Smooth*: a number of steps, or a word for automatic.
+        window: Length of the window in frames.
+        skip_repeats: Whether repeated frames are left out.
+    """
     for steps_for in features.each("steps_for"):
         return int(steps_for(medium, smooth, window, skip_repeats=skip_repeats))
     return 1
 
 
 def steps_key(snapshot: Snapshot) -> tuple:
-    """Return what an effect's steps from a filmed frame to the next (find_steps) depend on."""
+    """Return what an effect's number of steps depends on: footage, *Smooth*, window, *Skip Repeats*."""
     options = _options(snapshot)
     return snapshot.source.key, options.step, options.window, options.skip_repeats
 
 
 def _options(snapshot: Snapshot) -> Options:
-    """Return an effect's options; those that decide about steps cannot be keyed."""
+    """Return an effect's options at any of its frames; those that are used here cannot be keyed."""
     return snapshot.effect.options.at(min(snapshot.frames))
 
 
 def open_source(snapshot: Snapshot) -> ShotSource:
-    """Open an effect's source in full detail. EffectError, MediaError: there is none."""
+    """Open an effect's footage in full detail.
+
+    Raises:
+        EffectError, MediaError: It cannot be read.
+    """
     return SourceKey.of(snapshot).open()
 
 
 def clip_of(snapshot: Snapshot, source: FrameSource) -> Clip:
-    """Return an effect's source as plain facts, with its timing."""
+    """Return the size, length and timing of an effect's footage, as the model wants them.
+
+    Args:
+        source: The opened footage.
+    """
     return Clip.of(source, snapshot.effect.time or snapshot.timing)

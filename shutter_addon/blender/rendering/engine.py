@@ -1,4 +1,4 @@
-"""The render engine of effect scenes, which Blender's sequencer calls for every frame of an effect strip."""
+"""The render engine of effect scenes, which Blender's sequencer asks for every frame of an effect strip."""
 
 import inspect
 from dataclasses import replace
@@ -85,7 +85,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
                 render_pass.rect.foreach_set(values)
 
     def fail(self, sentence: str) -> None:
-        """Report why there is no picture, and end a render, which would write the frame without the effect."""
+        """Report why there is no picture. End a film's render, which would write the frame without the effect."""
         if render_job.ends_films():
             render_job.fail(sentence)
             render_job.cancel(self.test_break)

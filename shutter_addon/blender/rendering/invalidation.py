@@ -1,7 +1,7 @@
-"""Drop frames that the sequencer keeps, and snapshots of previews, when an effect has changed.
+"""When an effect has changed, drop the frames that the sequencer keeps and the snapshots of previews.
 
-Blender knows only a strip's own properties. Properties of an effect drop frames by update callbacks. Keys, strokes and
-sources are compared with what they were, because no callback reports them.
+Blender drops frames only when a strip's own properties change. Properties of an effect drop frames by update callbacks.
+Keys, strokes and sources are compared with what they were, because no callback reports them.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from ..devices import main_thread
 
 @dataclass
 class _Frames:
-    """What the sequencer may keep of effects, by session_uid of the effect scene.
+    """What is known of the frames that the sequencer may keep of effects, by session_uid of the effect scene.
 
     Attributes:
-        signatures: What their frames depend on.
-        failed: Those of which a frame failed.
-        reduced: Those with a frame of reduced quality for a preview.
+        signatures: effect_version.preview_key when they were made.
+        failed: Effect scenes of which a frame failed.
+        reduced: Effect scenes of which a frame has less than full quality, for a preview.
     """
 
     signatures: dict[int, int] = field(default_factory=dict)
@@ -36,53 +36,53 @@ _frames = _Frames()
 
 
 def current(scene: Scene, effect: PropertyGroup, strip: Strip, frame: float) -> Snapshot:
-    """Return the snapshot of an effect strip at a timeline frame for drawing, kept until something changes.
+    """Return the snapshot of an effect strip at a timeline frame, for drawing. It is kept until something changes.
 
     Raises:
-        EffectError, MediaError: As snapshot.take.
+        EffectError, MediaError: As in snapshot.take.
     """
     key = effect.scene.session_uid, strip.name, frame
     return revision.until_change("snapshot", key, lambda: snapshot.take(scene, effect, strip, (frame,)))
 
 
 def forget() -> None:
-    """Forget the effects of a file, before another one is loaded."""
+    """Forget what is known of a file's effects, before another file is loaded."""
     _frames.signatures.clear()
     revision.changed()
 
 
 def mark_failed(scene: int) -> None:
-    """Note that a picture of an effect scene failed."""
+    """Note that a picture of the effect scene with this session_uid failed."""
     _frames.failed.add(scene)
 
 
 def drop_failed() -> None:
-    """Drop frames that failed: the sequencer would show them again without calling the engine."""
+    """Drop frames of effects that failed: the sequencer would show them again without asking the engine."""
     _drop(_frames.failed)
 
 
 def mark_reduced(scene: int) -> None:
-    """Note that the sequencer got a reduced picture of an effect scene for a preview.
+    """Note that the sequencer got a picture with less than full quality, of the effect scene with this session_uid.
 
-    Blender would share it with renders, scopes and the color picker, so the draw handler drops it.
+    Blender would use it for renders, scopes and the color picker, too, so the draw handler drops it.
     """
     _frames.reduced.add(scene)
     main_thread.later(drop_reduced)  # in case the handler is not called
 
 
 def drop_reduced() -> None:
-    """Drop reduced frames for previews."""
+    """Drop the frames that were noted by mark_reduced."""
     _drop(_frames.reduced)
 
 
 def drop_frames() -> None:
-    """Drop the finished frames of all effects."""
+    """Drop the frames that the sequencer keeps of all effects."""
     for scene in bpy.data.scenes:
         strips.invalidate(scene)
 
 
 def _drop(noted: set[int]) -> None:
-    """Empty a set of session_uids of effect scenes, and drop their frames."""
+    """Drop the frames of the effect scenes with these session_uids, and empty the set."""
     uids = {noted.pop() for _ in range(len(noted))}
     for scene in bpy.data.scenes if uids else ():
         for strip in strips.effect_strips(scene):
@@ -91,7 +91,7 @@ def _drop(noted: set[int]) -> None:
 
 
 def invalidate_changed(scene: Scene) -> bool:
-    """Drop the frames of effects whose keys, strokes or source have changed. Return whether there are any.
+    """Drop the frames of a scene's effects whose keys, strokes or source have changed. Return whether there were any.
 
     Values of keyed properties do not count, as they change with every frame that plays.
     """

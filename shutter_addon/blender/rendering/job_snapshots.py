@@ -1,4 +1,4 @@
-"""The snapshots of which pictures are made.
+"""Get the snapshot (plain data) of the effect whose picture is to be made, read when Blender's data may be read.
 
 On Blender's main thread, an effect is read when its picture is asked for. In the background, the second frame of a film
 reads it for all later ones, unless a script that runs at frames may change it. A job of the window renders on a thread
@@ -25,7 +25,11 @@ from .render_job import Where, job
 
 
 def begin(film: int) -> None:
-    """Read all effects for a job, on the main thread. `film` is the session_uid of the rendered scene."""
+    """Read all effects that a film shows, before another thread renders it. Called on the main thread.
+
+    Args:
+        film: session_uid of the rendered scene.
+    """
     end()
     film_scene = strips.scene_of_uid(film)
     for scene, effect, parts in shown_effects(film_scene) if film_scene else ():
@@ -42,37 +46,48 @@ def begin(film: int) -> None:
 
 
 def _part_at(parts: list[tuple[range, Snapshot]], scene_frame: float) -> Snapshot:
-    """Return the snapshot of the part that shows a frame of the effect's scene, else the first."""
+    """Return the snapshot of the part of a cut strip that shows a frame of the effect scene; else the first part's.
+
+    Args:
+        parts: Timeline frames and snapshot of each part.
+    """
     frame = parts[0][1].timeline_frame(scene_frame)
     return next((taken for shown, taken in parts if shown.start <= frame < shown.stop), parts[0][1])
 
 
 def end() -> None:
-    """Forget all snapshots, after a job or a film."""
+    """Forget all snapshots, after a render."""
     job.film_data = render_job.FilmData(feed=job.film_data.feed)
     sessions.end_job()
 
 
 def look(film: int) -> None:
-    """Find the frames at which the sequencer leaves effects out: the user may delete a camera during the render."""
+    """Find out again at which frames the sequencer leaves effects out, and why, for a render on another thread.
+
+    The user may delete a camera during the render, for example.
+
+    Args:
+        film: session_uid of the rendered scene.
+    """
     scene = strips.scene_of_uid(film)
     job.film_data.left_out = requirements.left_out(scene) if scene else []
 
 
 def left_out(scene: Scene) -> str | None:
-    """Return why the sequencer leaves an effect out of a film's current frame, or None."""
+    """Return why the sequencer leaves an effect out of a film's current frame; None: it leaves none out."""
     reasons = job.film_data.left_out if render_job.where() is Where.JOB else requirements.left_out(scene)
     return next((why for frames, why in reasons if scene.frame_current in frames), None)
 
 
 def of(effect_scene: Scene, scene_frame: float, ended: Callable[[], bool] | None = None) -> tuple[Snapshot, float]:
-    """Return the snapshot of an effect scene, and the timeline frame that shows one of its frames.
+    """Return the snapshot (plain data) for a frame of an effect scene, and the timeline frame at which that is shown.
 
     Args:
-        ended: Tells whether the result is no longer wanted.
+        ended: Tells whether the result is no longer wanted; None: wait for a few seconds at most.
 
     Raises:
-        One of effect_source.FAULTS: There is none.
+        effect_source.FAULTS: The effect cannot be shown.
+        StoppedError: It is no longer wanted.
     """
     uid = effect_scene.session_uid
     if render_job.where() is Where.JOB:
@@ -93,7 +108,10 @@ def of(effect_scene: Scene, scene_frame: float, ended: Callable[[], bool] | None
 
 
 def _of_film(effect_scene: Scene, scene_frame: float) -> tuple[Snapshot, float]:
-    """Return what `of` returns, in the background."""
+    """Return what `of` returns, in the background: a kept snapshot if it has the frame, else a new one.
+
+    From a film's second frame on, it has all frames of the film.
+    """
     scene, effect, strip = strips.find_effect(effect_scene, scene_frame)
     frame = strips.timeline_frame(strip, scene_frame)
     key, frames = (effect.scene.session_uid, strip.name), {frame, frame + scene.frame_step}
@@ -110,7 +128,14 @@ def _of_film(effect_scene: Scene, scene_frame: float) -> tuple[Snapshot, float]:
 
 
 def _late(uid: int, scene_frame: float) -> Snapshot:
-    """Return a snapshot that a job did not take when it began. One of effect_source.FAULTS: there is none."""
+    """Return a snapshot that was not taken when a render began. Called on the main thread.
+
+    Args:
+        uid: session_uid of the effect scene.
+
+    Raises:
+        effect_source.FAULTS: The effect cannot be shown.
+    """
     if (effect_scene := strips.scene_of_uid(uid)) is None:
         raise EffectError(rpt_("the effect was deleted while it was rendered"))
     scene, effect, strip = strips.find_effect(effect_scene, scene_frame)
@@ -118,7 +143,7 @@ def _late(uid: int, scene_frame: float) -> Snapshot:
 
 
 def shown_effects(film: Scene) -> Iterator[tuple[Scene, PropertyGroup, list[Strip]]]:
-    """Yield the effects that a film's scene and the scenes in its Scene strips show: scene, effect, effect strips."""
+    """Yield the effects in a film's scene and in scenes inside it, each as (scene, effect, its effect strips)."""
     for scene in requirements.shown_scenes(film):
         shown = strips.effect_strips(scene)
         for effect in scene.virtual_shutter.effects:
@@ -127,7 +152,11 @@ def shown_effects(film: Scene) -> Iterator[tuple[Scene, PropertyGroup, list[Stri
 
 
 def asked_frames(scene: Scene, parts: list[Strip], is_film: bool) -> set[float]:
-    """Return the timeline frames at which parts of an effect may be rendered: the film's, or all in another scene."""
+    """Return the timeline frames at which the engine may be asked for parts of a cut effect strip.
+
+    Args:
+        is_film: Whether `scene` is the rendered one, so that only its frame range counts.
+    """
     first, last = scene.frame_start, scene.frame_end
     asked = set()
     for strip in parts:

@@ -1,4 +1,4 @@
-"""The picture of an effect strip at a timeline frame, as the engine gives it to Blender."""
+"""Make the picture of an effect strip at a timeline frame, as the engine gives it to Blender."""
 
 from __future__ import annotations
 
@@ -27,9 +27,12 @@ SLOW_DECODING = n_("a second Blender decodes movies, which is slow: install the 
 
 
 def picture(context: RenderContext, snapshot: Snapshot, frame: float, detail: Detail = FULL) -> np.ndarray:
-    """Return the picture (H, W, 4) of an effect strip at a timeline frame, top row first.
+    """Return the picture of an effect strip at a timeline frame, (H, W, 4), top row first.
 
-    It is scene-linear premultiplied float32, or levels if the context asks for them.
+    It is scene-linear float32 with premultiplied alpha, or 8-bit display levels if the context asks for them.
+
+    Args:
+        context: Session, messages and stop of whoever wants it.
 
     Raises:
         effect_source.FAULTS: The picture cannot be made.
@@ -49,16 +52,23 @@ def picture(context: RenderContext, snapshot: Snapshot, frame: float, detail: De
 
 
 def _weights(renderer: Renderer, request: Request) -> list[np.ndarray]:
-    """Return the coefficients (h, w) of all shutters, then the mattes of all layers in blocks of the same size."""
+    """Return the pictures (h, w) for --weights: how much of each shutter pixels get, then the mattes of layers.
+
+    Each has a pixel for each block of the picture's pixels that share this.
+    """
     block = request.state.options.aggregate
     mattes = [block_means(matte, block) for matte in renderer.layer_mattes(request)]
     return [*renderer.coefficients(request), *mattes]
 
 
 def _write_weights(place: Path, snapshot: Snapshot, frame: float, weights: list[np.ndarray]) -> None:
-    """Write a channel for each shutter and, after these, for each layer, named after its region.
+    """Write an EXR file with a channel for each shutter and, after these, for each layer, named after its region.
 
     A layer that is missing at this frame is empty. A name that is taken gets a number.
+
+    Args:
+        place: The file.
+        weights: What _weights returned.
     """
     effect = snapshot.effect
     names = [shutter.name for shutter in effect.shutters]
@@ -70,7 +80,7 @@ def _write_weights(place: Path, snapshot: Snapshot, frame: float, weights: list[
 
 
 def shortages(renderer: Renderer, snapshot: Snapshot, request: Request) -> Iterator[str]:
-    """Yield sentences about what pictures lack (`unread`), and about speed where GPU memory is short."""
+    """Yield warnings about a picture: what may be wrong (`unread`), and that too little GPU memory makes it slow."""
     yield from unread(snapshot, request)
     if renderer.is_short:
         source = renderer.source
@@ -84,7 +94,7 @@ def shortages(renderer: Renderer, snapshot: Snapshot, request: Request) -> Itera
 
 
 def unread(snapshot: Snapshot, request: Request) -> Iterator[str]:
-    """Yield sentences about what Blender does not tell for a picture: how strips are retimed, and colors."""
+    """Yield warnings about retiming keys that cannot be read, and about blending that changes colors in Blender."""
     layers = request.state.layers.mattes if request.state.layers else ()
     contents = [matte.content for matte in chain(request.state.mattes, *layers) if matte is not None]
     for timing in (snapshot.timing, *(getattr(content, "timing", None) for content in contents)):
@@ -103,9 +113,10 @@ def unread(snapshot: Snapshot, request: Request) -> Iterator[str]:
 
 
 def resized(picture: np.ndarray, width: int, height: int, divisor: int = 1) -> np.ndarray:
-    """Return the picture at the size that Blender asks for, which a resolution below 100 % makes smaller.
+    """Return a picture (H, W, 4) at the size that Blender asks for, which is smaller with a resolution below 100 %.
 
-    Pixels of a picture that was composed `divisor` times smaller are repeated.
+    Args:
+        divisor: How many times smaller than the source it was composed; its pixels are repeated first.
     """
     if divisor > 1:
         picture = picture.repeat(divisor, axis=0).repeat(divisor, axis=1)[:height, :width]

@@ -1,4 +1,4 @@
-"""What previews show of an effect: in which detail, and whether our draw handler or Blender shows it.
+"""Decide what previews show of an effect: in which detail, and whether our draw handler draws it or Blender shows it.
 
 This is decided once for each redraw: for the engine, if Blender asks it for the picture, and then for the draw handler.
 Blender asks the engine for a Scene strip's full size whatever the preview's size, takes floats, converts, blends and
@@ -39,11 +39,12 @@ RESULTS = "RESULT", "SPLIT", "EDGES"  # views of the live preview that show the 
 
 @dataclass
 class Whole:
-    """The picture that the user looks at in full quality.
+    """The picture that the user looks at with *Full Quality*.
 
     Attributes:
-        scene: session_uid of the effect's scene.
-        key: Request.key without its source; None: it was not drawn yet.
+        scene: session_uid of the effect scene.
+        frame: Timeline frame.
+        key: Request.key without its source, to notice changes; None: it was not drawn yet.
     """
 
     scene: int
@@ -53,14 +54,16 @@ class Whole:
 
 @dataclass(frozen=True)
 class Decision:
-    """What a preview shows of an effect in a redraw.
+    """What a preview shows of an effect in one redraw.
 
     Attributes:
-        request: The picture in the previews' detail.
-        is_drawn: Whether our draw handler shows the result, so that the engine need not.
-        is_plain: Whether this is the plain picture, and the smooth one follows.
-        is_late: Whether the engine was stopped so that Blender handles events.
-        stopped: Tells that the picture takes too long; None: Blender waits for it.
+        snapshot: The effect.
+        frame: Timeline frame.
+        request: The picture, in the detail that previews have.
+        is_drawn: Whether our draw handler shows it, so that the engine need not make one.
+        is_plain: Whether it is without moments between frames, and one with them follows.
+        is_late: Whether making it took so long that the engine was stopped, to let Blender handle events.
+        stopped: Tells that it takes too long and has to stop; None: Blender waits for it.
     """
 
     snapshot: Snapshot
@@ -74,12 +77,14 @@ class Decision:
 
 @dataclass(frozen=True)
 class Drawing:
-    """What our draw handler draws of a decision.
+    """What the extension's draw handler draws over a preview.
 
     Attributes:
-        request: The picture, as a draft where a still result is not exact.
-        left: Where the source ends and the result begins, as a fraction of the width; 0: there is no source.
-        draws_result: Whether our handler draws the result.
+        decision: What the preview shows.
+        request: The picture to draw, as a draft where it need not be exact.
+        renderer: Makes the picture.
+        left: Fraction of the picture's width from the left where the source is shown instead of the result.
+        draws_result: Whether the handler draws the result; otherwise Blender shows it.
     """
 
     decision: Decision
@@ -91,12 +96,12 @@ class Drawing:
 
 @dataclass
 class _Pen:
-    """What the pen has changed in the previews.
+    """What drawing strokes has changed in the previews.
 
     Attributes:
-        channel: display channel that the previews show; 0: the result.
-        tool: tool that *Draw* or *Erase* replaced, to restore after the stroke; "": none.
-        is_down: whether the pen was down when a preview was last drawn.
+        channel: Display channel that the previews show; 0: the result.
+        tool: Tool that *Draw* or *Erase* replaced, to restore after the stroke; "": none.
+        is_down: Whether the pen was down when a preview was last drawn.
     """
 
     channel: int = 0
@@ -106,14 +111,15 @@ class _Pen:
 
 @dataclass
 class _Looking:
-    """How previews are looked at.
+    """The state of the window's previews.
 
     Attributes:
-        late_until: Time until which pictures may be late.
-        decision: The engine's, for the draw handler that Blender calls next.
-        slices: Slices of time in which a request is composed.
-        pen: Blender does not report strokes.
-        emptied: Addresses of spaces from which an effect's annotation was removed.
+        whole: The picture in full quality; None: none is shown so.
+        late_until: Time (time.monotonic) until which pictures may be late, because the user scrubs or tracks.
+        decision: What the engine was asked for, for the draw handler that Blender calls next.
+        slices: The slices of time in which a slow picture is made, between redraws.
+        pen: What drawing strokes has changed.
+        emptied: Addresses of spaces from which an effect's annotation was taken.
     """
 
     whole: Whole | None = None
@@ -128,10 +134,10 @@ looking = _Looking()
 
 
 def for_engine(context: Context, effect_scene: Scene) -> Decision | None:
-    """Return what the engine has to make while Blender draws a preview; None: something else asks.
+    """Return what the engine has to make while Blender draws a preview; None: it is not asked for a preview.
 
     Raises:
-        One of effect_source.FAULTS: The effect cannot be shown.
+        effect_source.FAULTS: The effect cannot be shown.
     """
     region, looking.decision = context.region, None
     if region is None or region.type != "PREVIEW" or is_read(context):
@@ -153,16 +159,20 @@ def for_engine(context: Context, effect_scene: Scene) -> Decision | None:
 
 
 def take_decision() -> Decision | None:
-    """Return the engine's decision for this redraw; None: Blender had the picture already."""
+    """Return what for_engine decided for this redraw, once; None: Blender did not have to ask the engine."""
     decision, looking.decision = looking.decision, None
     return decision
 
 
 def for_drawing(context: Context, shown: Shown, decision: Decision | None) -> Drawing:
-    """Return what our draw handler draws. The engine's decision holds unless something has changed since.
+    """Return what the extension's draw handler draws over a preview.
+
+    Args:
+        shown: The effect strip that the preview shows.
+        decision: What for_engine decided, which holds unless the effect has changed since; None: it was not asked.
 
     Raises:
-        One of effect_source.FAULTS: The effect cannot be shown.
+        effect_source.FAULTS: The effect cannot be shown.
     """
     settings, snapshot = context.window_manager.virtual_shutter, _snapshot(shown)
     if decision is None or decision.snapshot is not snapshot:
@@ -181,10 +191,10 @@ def for_drawing(context: Context, shown: Shown, decision: Decision | None) -> Dr
 
 
 def request_of(context: Context, shown: Shown) -> Request:
-    """Return what our draw handler draws of the effect strip at the current frame.
+    """Return what to compose for the picture that our draw handler draws of an effect strip at the current frame.
 
     Raises:
-        One of effect_source.FAULTS: The effect cannot be shown.
+        effect_source.FAULTS: The effect cannot be shown.
     """
     return _drafted(context, shown, _decide(context, shown, _look(context, shown), _snapshot(shown)).request)
 
@@ -205,9 +215,9 @@ def _snapshot(shown: Shown) -> Snapshot:
 
 
 def _requested(context: Context, shown: Shown, snapshot: Snapshot, look: Look) -> tuple[Request, bool]:
-    """Return, as _best, the picture in the previews' detail, or in full while it is looked at so.
+    """Return, as _best, the request in the detail of previews or, with *Full Quality*, in full detail.
 
-    Another frame or a change of the effect ends full quality.
+    *Full Quality* ends here when another frame is shown or the effect has changed.
     """
     frame = shown.scene.frame_current
     whole = looking.whole
@@ -221,7 +231,10 @@ def _requested(context: Context, shown: Shown, snapshot: Snapshot, look: Look) -
 
 
 def _best(context: Context, snapshot: Snapshot, frame: float, detail: effect_source.Detail) -> tuple[Request, bool]:
-    """Return the picture in a detail, and whether it is the plain one because the smooth one is not ready."""
+    """Return the request for a picture that also exposes moments between frames if that is ready, else without them.
+
+    The second value tells whether the picture with moments follows.
+    """
     render = sessions.of_drawing()
     if not is_read(context) and detail.smooth:
         for smooth_request in features.each("smooth_request"):
@@ -231,10 +244,10 @@ def _best(context: Context, snapshot: Snapshot, frame: float, detail: effect_sou
 
 
 def _detail(context: Context, look: Look) -> effect_source.Detail:
-    """Return the detail of pictures for all previews of a scene.
+    """Return the detail that all previews of a scene share.
 
-    The divisor is the one of reduced.DIVISORS that is nearest to the largest preview, whose proxy counts, too. During
-    playback and in other views pictures are not smooth, as optical flow takes long.
+    The divisor is the one of reduced.DIVISORS that fits the largest preview, or its proxy, best. While playing and in
+    views other than the result, pictures have no moments between frames, because optical flow takes long.
     """
     if (scale := look.scale) is None:
         return effect_source.FULL
@@ -244,12 +257,13 @@ def _detail(context: Context, look: Look) -> effect_source.Detail:
 
 
 def _is_drawn(context: Context, shown: Shown, look: Look, source: FrameSource, *, is_less: bool) -> bool:
-    """Tell whether our draw handler shows the picture in place of Blender: where both look the same in all previews.
+    """Tell whether our draw handler shows the picture instead of Blender, which it may where both look the same.
 
-    A still picture of full size is left to Blender, as drawing goes through 8 bits, and lacks shades next to black.
+    A still picture of full size is left to Blender, because what the handler draws has only 8 bits.
 
     Args:
-        is_less: Whether a better picture follows.
+        source: The opened footage, in the previews' size.
+        is_less: Whether a better picture will follow.
     """
     settings = context.window_manager.virtual_shutter
     is_small = source.from_proxy or source.width < annotations.picture_size(shown.effect)[0]
@@ -265,7 +279,10 @@ def _drafted(context: Context, shown: Shown, request: Request) -> Request:
 
 
 def draft(request: Request, source: FrameSource) -> Request:
-    """Return the request as a draft: where shutters follow edges, in blocks, DRAFT_ROWS at most along a side."""
+    """Return the request in coarser blocks of pixels where shutters follow edges, for speed.
+
+    The blocks are at most DRAFT_ROWS along the picture's shorter side.
+    """
     options = request.state.options
     if not options.edge_aware:
         return request
@@ -276,12 +293,12 @@ def draft(request: Request, source: FrameSource) -> Request:
 
 
 def _is_rendered(shown: Shown) -> bool:
-    """Tell whether the sequencer renders its previews."""
+    """Tell whether the sequencer's previews show Scene strips rendered, by our engine."""
     return shown.scene.render.sequencer_gl_preview == "RENDERED"
 
 
 def _time_up(context: Context, request: Request) -> Slice:
-    """Return a function that tells that a picture has taken so long that Blender has to handle events.
+    """Return a function that tells, once it returns True, that Blender has to handle events before the picture goes on.
 
     The picture goes on in the next redraw.
     """
@@ -293,7 +310,11 @@ def _time_up(context: Context, request: Request) -> Slice:
 
 
 def refine() -> None:
-    """Go on with the smooth pictures behind those drawn. One of effect_source.FAULTS: there is none."""
+    """Go on with pictures that also expose moments between frames, which will replace those that are drawn.
+
+    Raises:
+        effect_source.FAULTS: One cannot be made.
+    """
     if pen_is_down():
         features.call("rest_smooth")
     elif looking.slices.last is None:
@@ -301,14 +322,14 @@ def refine() -> None:
 
 
 def show_carried() -> None:
-    """Redraw previews with new mattes of outlines."""
+    """Have previews drawn again after mattes of outlines were tracked."""
     sessions.SESSIONS.window.keep(set())
     invalidation.drop_frames()
     preview_areas.redraw()
 
 
 def is_going(context: Context) -> bool:
-    """Tell whether the film plays, or pictures may be late."""
+    """Tell whether the film plays, or pictures may be late (may_be_late)."""
     return _is_playing(context) or may_be_late()
 
 
@@ -317,18 +338,18 @@ def _is_playing(context: Context) -> bool:
 
 
 def pen_is_down() -> bool:
-    """Tell whether a stroke is being drawn or erased."""
+    """Tell whether the user is drawing or erasing a stroke right now."""
     return _PEN in render_job.operators_running()
 
 
 def may_be_late() -> bool:
-    """Tell whether the playhead is dragged or a tracking operator runs, or did a moment ago: then keys come first."""
+    """Tell whether the user scrubs or tracks, or did a moment ago, so that input comes before pictures."""
     if _GOING & render_job.operators_running():
         looking.late_until = time.monotonic() + _MOMENT
     return time.monotonic() < looking.late_until
 
 
 def is_read(context: Context) -> bool:
-    """Tell whether something reads the sequencer's picture from the window, and needs all of it."""
+    """Tell whether an operator or tool reads the sequencer's picture, and so needs it in full quality."""
     tool = context.workspace and context.workspace.tools.from_space_sequencer("PREVIEW", create=False)
     return bool(_READERS & render_job.operators_running()) or (tool is not None and tool.idname == _READING_TOOL)

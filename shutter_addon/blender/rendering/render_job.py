@@ -1,4 +1,4 @@
-"""The running render: its film, what failed, and how it ends early.
+"""The render that is running: whether there is one, on which thread, why it failed, and how to end it early.
 
 Blender writes a frame without the effect if the engine fails, so a missing picture has to end the whole render. Blender
 then finishes a movie file with the frames before, and calls `render_cancel`.
@@ -39,13 +39,13 @@ _LONG = 10.0  # seconds that a thread waits for the window
 
 
 def say(text: str) -> None:
-    """Print a line on stderr."""
+    """Print a message on stderr, after the extension's name."""
     with suppress(OSError, AttributeError):  # stderr is closed, or missing
         print(signed(text), file=sys.stderr, flush=True)
 
 
 class Where(Enum):
-    """Where Blender calls the extension.
+    """In which situation Blender calls the extension.
 
     BACKGROUND is without a window, WINDOW on a window's main thread. JOB is a job's thread, while the window goes on.
     WAITED_FOR is such a thread while the window waits for every picture (View ▸ Render Sequencer Animation): it reads
@@ -60,14 +60,14 @@ class Where(Enum):
 
 @dataclass
 class FilmData:
-    """What is known of the running job or film, by session_uid of effect scenes.
+    """What is kept for the running job or film. Effects are known by the session_uid of their effect scene.
 
     Attributes:
         taken: Of a job: timeline frames and snapshot of each part of a cut strip, or why there is none.
-        read: Of a film in the background, by effect scene and strip; None: it was read once, for one frame.
-        pictures: Of a job: the last ones, shown until the next are made.
-        left_out: Of a job: see requirements.left_out.
-        feed: Of a film in the background: its file of levels (output.edit_feed), or None.
+        read: Of a film in the background: the snapshot by effect scene and strip; None: read once, for one frame.
+        pictures: Of a job: the last picture of each effect, shown until the next is made.
+        left_out: Of a job: what requirements.left_out returned.
+        feed: Of a film in the background: how the edit was changed (output.edit_feed), or None.
     """
 
     taken: dict[int, list[tuple[range, Snapshot]] | Exception] = field(default_factory=dict)
@@ -79,23 +79,23 @@ class FilmData:
 
 @dataclass
 class _Job:
-    """The render that runs, or ran last.
+    """The render that is running, or ran last.
 
     Attributes:
         film: session_uid of the rendered scene, not of effect scenes or scenes in strips; None: nothing renders.
         begun: Whether its first frame has begun.
-        stopping: Whether it ends after the current frame, as at Ctrl-C.
-        failure: The sentence that ends it, or ended the last one.
-        tell: Called with that sentence in the background.
-        cancelling: Whether the small render runs whose error ends it (_cancel).
+        stopping: Whether it ends after the current frame, as after Ctrl-C.
+        failure: The sentence that says why it ends, or why the last one ended.
+        tell: Called with that sentence.
+        cancelling: Whether the small render is running whose error ends this one (_cancel).
         waited_for: Whether the window waits for every picture (Where.WAITED_FOR).
         spent: Names of scenes and cameras of small renders (_cancel).
-        said: Sentences that were said once (say_once).
-        film_data: What is known of the running job or film.
-        device: One of available.CHOICES, of a command.
-        weights: Folder for the coefficients of every picture, as EXR files, of a command.
-        gpu_memory: Megabytes of the GPU that textures may take, of a command; 0: as device.allowed.
-        budget: With the megabytes that it was made for.
+        said: Sentences that were said (say_once).
+        film_data: What is kept for the running job or film.
+        device: One of available.CHOICES, of a command; None: the user's.
+        weights: Folder for the coefficients of every picture, as EXR files, of a command; None: none.
+        gpu_memory: Megabytes of the GPU that textures may take, of a command; 0: as device.allowed; None: the user's.
+        budget: The megabytes that were wanted, and the budget made of them; None: not made yet.
     """
 
     film: int | None = None
@@ -118,14 +118,19 @@ job = _Job()
 
 
 def say_once(text: str, to: Callable[[str], None]) -> None:
-    """Pass a sentence to a function, unless that was done before."""
+    """Call `to` with a sentence, unless it was said before."""
     if text not in job.said:
         job.said.add(text)
         to(text)
 
 
 def begin(scene: Scene) -> bool:
-    """Note that a render begins. Return whether it is a film or a picture, not a scene in one or a preview."""
+    """Note that a render begins.
+
+    Returns:
+        Whether it is the user's render, of a film or a picture. It is not if an effect is rendered for one, or a
+        preview.
+    """
     is_effect = scene.render.engine == ENGINE
     if job.film is not None and (job.begun or is_effect):
         return False
@@ -139,12 +144,12 @@ def begin(scene: Scene) -> bool:
 
 
 def runs() -> bool:
-    """Tell whether a film, or a single picture of it, is rendered."""
+    """Tell whether a render of the user's is running, of a film or a single picture."""
     return job.film is not None
 
 
 def is_film(scene: Scene) -> bool:
-    """Tell whether this scene is what is rendered; called before each of its frames."""
+    """Tell whether this scene is the one that is rendered. To be called before each of its frames."""
     if scene.session_uid != job.film:
         return False
     job.begun = True
@@ -152,10 +157,13 @@ def is_film(scene: Scene) -> bool:
 
 
 def end(scene: Scene, alone: bool) -> None:
-    """Note that a render has ended.
+    """Note that the render of a scene has ended.
+
+    If it failed in the background and no script waits, end the process with BAD_INPUT: Blender would go on, or exit
+    with 1.
 
     Args:
-        alone: Whether no Python code waits for it, so that Blender would go on or exit with code 1.
+        alone: Whether no Python code waits for it.
     """
     if scene.session_uid == job.film:
         job.film = None
@@ -168,9 +176,9 @@ def end(scene: Scene, alone: bool) -> None:
 
 
 def ends_films() -> bool:
-    """Tell whether an error here ends a film: in the background, in a window's job, or in a script.
+    """Tell whether an error here has to end a whole render: in the background, on a job's thread, or in a script.
 
-    Otherwise it is in a preview.
+    Otherwise the error is in a preview.
     """
     if where() is not Where.WINDOW:
         return True
@@ -178,7 +186,7 @@ def ends_films() -> bool:
 
 
 def script_waits(call_frame: FrameType | None) -> bool:
-    """Tell whether a script waits for what Blender does now, for which Blender itself has no API.
+    """Tell whether a script, through an operator, waits for what Blender does now. Blender has no API for that.
 
     Args:
         call_frame: inspect.currentframe() of the function that Blender has called.
@@ -187,7 +195,7 @@ def script_waits(call_frame: FrameType | None) -> bool:
 
 
 def where() -> Where:
-    """Return where we are called."""
+    """Return in which situation Blender calls the extension now."""
     if bpy.app.background:
         return Where.BACKGROUND
     if threading.current_thread() is threading.main_thread():
@@ -196,14 +204,14 @@ def where() -> Where:
 
 
 def operators_running() -> set[str]:
-    """Return the names of the modal operators of all windows."""
+    """Return the bl_idnames of the modal operators that run in any window."""
     windows = bpy.context.window_manager.windows
     return {operator.bl_idname for window in windows for operator in window.modal_operators}
 
 
 @contextmanager
 def calling(handlers: list, function: Callable) -> Iterator[None]:
-    """Add a function to one of bpy.app.handlers inside a `with` block."""
+    """Add a function to one of the lists of bpy.app.handlers within a `with` block."""
     handlers.append(function)
     try:
         yield
@@ -212,7 +220,7 @@ def calling(handlers: list, function: Callable) -> Iterator[None]:
 
 
 def scripts_act() -> bool:
-    """Tell whether scripts have handlers that run at rendered frames, and may change anything."""
+    """Tell whether other scripts have handlers that run at rendered frames, and may change the edit there."""
     handlers, own = bpy.app.handlers, __name__.split(".blender.")[0]
     lists: list[list] = [handlers.render_pre, handlers.render_post, handlers.render_write, handlers.render_stats]
     lists += [handlers.render_init, handlers.frame_change_pre, handlers.frame_change_post]  # run for each effect
@@ -221,10 +229,13 @@ def scripts_act() -> bool:
 
 
 def on_main_thread(function: Callable[[], T], ended: Callable[[], bool] | None = None) -> T | None:
-    """Return a function's result on Blender's main thread, or None if it is no longer wanted before it begins.
+    """Have Blender's main thread call a function, and return the result.
 
     Args:
-        ended: Tells whether the result is no longer wanted. Without it, this waits for some seconds.
+        ended: Tells whether the result is no longer wanted; None: wait for _LONG seconds at most.
+
+    Returns:
+        None if it is no longer wanted before the call begins.
     """
     if where() is not Where.JOB:
         return function()
@@ -239,7 +250,7 @@ def on_main_thread(function: Callable[[], T], ended: Callable[[], bool] | None =
 
 
 def soon(function: Callable[[], None]) -> None:
-    """Call a function on the main thread: at once, if this is it."""
+    """Have a function called on the main thread: at once if this is it, else when it next can, without waiting."""
     if where() in (Where.JOB, Where.WAITED_FOR):
         main_thread.soon(function)
     else:
@@ -247,24 +258,25 @@ def soon(function: Callable[[], None]) -> None:
 
 
 def stopping() -> bool:
-    """Tell whether the film of this picture was stopped, or has failed."""
+    """Tell whether the film that this picture is for was stopped, or has failed."""
     return job.film is not None and ends_films() and (job.stopping or job.failure is not None)
 
 
 def fail(text: str) -> None:
-    """Say why the running render has to end; only the first sentence counts."""
+    """Note a sentence about why the running render has to end, and tell the user. Only the first one counts."""
     if job.failure is None:
         job.failure = text
         job.tell(text)
 
 
 def cancel(ended: Callable[[], bool] | None = None) -> None:
-    """End the render once this returns to Blender, from a picture or a handler before a frame.
+    """End the running render, as soon as the caller returns to Blender.
 
-    (After a frame, Blender would go on with the next, and crash.)
+    To be called while a picture is made, or from a handler before a frame. (After a frame, Blender would go on with the
+    next, and crash.)
 
     Args:
-        ended: Tells whether the window has ended it meanwhile. Without it, this waits for some seconds.
+        ended: Tells whether the window has ended the render meanwhile; None: wait for some seconds at most.
     """
     if where() is Where.JOB:
         on_main_thread(_cancel_and_show, ended)
@@ -276,14 +288,18 @@ def cancel(ended: Callable[[], bool] | None = None) -> None:
 
 
 def _cancel_and_show() -> None:
-    """Cancel, and show the failure in the window, where reports of an engine in the sequencer do not arrive."""
+    """Cancel the render, and show why in a popup, because reports of an engine in the sequencer do not arrive."""
     _cancel()
     if job.failure is not None:
         popup(sentence(job.failure), title="Virtual Shutter", icon="ERROR")
 
 
 def popup(words: str, **looks: str) -> None:
-    """Show a sentence, already translated, in a popup at the pointer. `looks` are its title and icon."""
+    """Show a translated sentence in a popup at the pointer.
+
+    Args:
+        looks: `title` and `icon` of the popup.
+    """
     manager = bpy.context.window_manager
     if window := bpy.context.window or next(iter(manager.windows), None):  # none while a file is loaded
         with bpy.context.temp_override(window=window):
@@ -291,9 +307,10 @@ def popup(words: str, **looks: str) -> None:
 
 
 def _cancel() -> None:
-    """Break a render from Python, which takes an engine's error that reaches an operator.
+    """End the running render by starting a small one with our engine, which fails.
 
-    Errors from within the sequencer reach none, so a small render beside it fails.
+    An engine's error ends renders if it reaches an operator. Errors from within the sequencer reach none, so a small
+    render beside it fails.
     """
     if job.cancelling:
         return
@@ -313,9 +330,9 @@ def _cancel() -> None:
 
 
 def _remove_spent() -> float | None:
-    """Remove what small renders used, once the job has ended; also a timer.
+    """Remove the scenes and objects that _cancel has made, once the render has ended. Also a timer of Blender.
 
-    During the film, Blender would free data of other effects in the same frame along with it, and crash.
+    During the render, Blender would free data of other effects in the same frame along with it, and crash.
     """
     if bpy.app.is_job_running("RENDER"):
         return _PATIENCE
@@ -327,7 +344,7 @@ def _remove_spent() -> float | None:
 
 
 def leave(code: int) -> None:
-    """Exit the process from inside Blender, which would report memory leaks after sys.exit."""
+    """Exit the process at once with an exit code. After sys.exit, Blender would report memory leaks."""
     with suppress(OSError, AttributeError):
         sys.stdout.flush()
     os._exit(code)

@@ -1,4 +1,4 @@
-"""Settings of renders: those of a command, else the user's preferences."""
+"""Settings of renders: the device and its memory, by a command's options or else the user's preferences."""
 
 from __future__ import annotations
 
@@ -12,25 +12,22 @@ from .render_job import job
 
 
 def using(**settings: object) -> AbstractContextManager[None]:
-    """Give renders these settings of a command inside a `with` block."""
+    """Let a command's options, by name of _Job's attributes, apply to renders within a `with` block."""
     return for_a_while((job, name, value) for name, value in settings.items())
 
 
 def wanted() -> str:
-    """Return the device that the command or the user wants, one of available.CHOICES."""
+    """Return the device that a command or the user wants, one of available.CHOICES."""
     return job.device or preferences.device()
 
 
 def _wanted_memory() -> int:
-    """Return the megabytes that the command or the user sets; 0: as many as allowed."""
+    """Return how many megabytes of GPU memory a command or the user allows textures; 0: devices.device decides."""
     return preferences.gpu_memory() if job.gpu_memory is None else job.gpu_memory
 
 
 def memory() -> Budget:
-    """Return the budget of GPU memory that all sessions share.
-
-    OpenGL knows the size best, where it may be asked.
-    """
+    """Return the budget of GPU memory that all sessions share: the wanted one, or a part of the GPU's memory."""
     if job.budget is None:
         megabytes = _wanted_memory()
         known = available.opengl().memory if not megabytes and wanted() in ("auto", "gpu", "opengl") else None
@@ -39,7 +36,7 @@ def memory() -> Budget:
 
 
 def forget_memory_if_changed() -> bool:
-    """Forget the budget if another limit is wanted now. Return whether it was."""
+    """Forget the budget if the user wants another limit now. Return whether that is so."""
     if job.budget is None or job.budget[0] == _wanted_memory():
         return False
     job.budget = None

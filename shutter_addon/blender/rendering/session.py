@@ -1,4 +1,4 @@
-"""A render session: a device, and renderers of the effects that were shown last, with the frames that they keep."""
+"""A render session: a device, and the renderers of the effects that were shown last, which keep their frames."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ Place = tuple[int, bool]  # SourceKey.place
 
 
 class Work(NamedTuple):
-    """What a session's device does.
+    """A function that a session's device is running or will run.
 
     Attributes:
-        future: Its result.
-        ended: Set, it ends before its next step.
+        future: Of its result.
+        ended: Makes it end before its next step when it is set.
     """
 
     future: Future
@@ -52,7 +52,11 @@ class Work(NamedTuple):
         self.future.cancel()
 
     def result(self) -> Any:
-        """Return the result as result_of; break the work off where it is no longer wanted."""
+        """Wait for the result and return it. Break the work off if that is no longer wanted.
+
+        Raises:
+            StoppedError, NoDeviceError: As in result_of.
+        """
         try:
             return result_of(self.future)
         except StoppedError:
@@ -61,11 +65,11 @@ class Work(NamedTuple):
 
 
 def result_of(future: Future[T]) -> T:
-    """Wait for a future's result.
+    """Wait for a future and return its result. On the window's main thread, make calls of other threads meanwhile.
 
     Raises:
         StoppedError: It is no longer wanted (stopping.once).
-        NoDeviceError: It waits for Blender's GPU, which is not current, so waiting would never end.
+        NoDeviceError: It waits for Blender's GPU, which cannot be used now, so waiting would never end.
     """
     is_window = where() is Where.WINDOW
     while not wait([future], 0 if is_window else _PATIENCE).done:
@@ -76,20 +80,20 @@ def result_of(future: Future[T]) -> T:
 
 
 def broken_off(stopped: Callable[[], bool], function: Callable[..., T], *arguments: object) -> T:
-    """Return a function's result, with `stopped` to break it off."""
+    """Return a function's result. It raises StoppedError at its next step once `stopped()` is true."""
     with stopping.once(stopped):
         return function(*arguments)
 
 
 @dataclass(frozen=True)
 class RenderContext:
-    """For whom pictures are made.
+    """For whom pictures are made: with which session, and in which form.
 
     Attributes:
-        session: The session whose device makes them.
-        say: Called with a sentence about a lesser device, or about what cannot be done.
+        session: Makes them on its device.
+        say: Called with a sentence for the user about a lesser device, or about what cannot be done.
         levels: Whether pictures are 8-bit display levels (Request.levels).
-        display: The display of these levels (Request.display).
+        display: How light becomes these levels (Request.display); None: as Request has it by default.
     """
 
     session: RenderSession
@@ -98,14 +102,14 @@ class RenderContext:
     display: Display | None = None
 
     def request(self, snapshot: Snapshot, frame: float, detail: Detail | None = None) -> Request:
-        """Return the request for what an effect strip shows at a timeline frame.
+        """Return the request for an effect strip's picture at a timeline frame: what it depends on, as plain data.
 
         Args:
-            detail: None: as it was the last time, where no picture is made.
+            detail: How detailed; None: as the last picture was, where no picture will be made.
 
         Raises:
-            effect_source.FAULTS: It cannot be shown.
-            StoppedError: It is no longer wanted.
+            effect_source.FAULTS: The effect cannot be shown.
+            StoppedError: The picture is no longer wanted.
         """
         session = self.session
         key = SourceKey.of(snapshot, detail or session.last_detail(snapshot.scene))
@@ -123,20 +127,23 @@ class RenderContext:
         return request
 
     def renderer(self, request: Request) -> Renderer:
-        """Return a renderer as RenderSession.renderer."""
+        """Return the renderer that makes a request's picture, opened if necessary."""
         return self.session.renderer(request.source, self.say)
 
 
 class RenderSession:
-    """A compositor, opened when it is first used, and the renderers of the effects that were shown last."""
+    """A device that composes pictures, and the renderers of the effects that were shown last, which keep their frames.
+
+    The device is opened when it is first used. If it can be used from any thread, it works on a thread of its own.
+    """
 
     def __init__(self, choose: Callable[[], Chosen], ask_others: Callable[[], None], late: Late | None = None) -> None:
-        """Make a session.
+        """Make a session, without opening anything.
 
         Args:
-            choose: Chooses the device, as available.choose.
-            ask_others: Called where the GPU is full, to free what other sessions have there.
-            late: As in MatteValues.
+            choose: Returns the device and why it is a lesser one, as available.choose.
+            ask_others: Called when the GPU's memory is full, to free what other sessions have there.
+            late: Called for mattes that are not tracked yet, as in MatteValues; None: pictures wait until they are.
         """
         self._choose, self._ask_others, self._late = choose, ask_others, late
         self._frees_others = False  # whether others free memory, in the middle of a picture
@@ -150,7 +157,11 @@ class RenderSession:
 
     @property
     def device(self) -> str:
-        """The device, a key of available.OPEN, kept until `forget`. NoDeviceError: there is none."""
+        """The device, a key of available.OPEN. It is chosen once, until `forget`.
+
+        Raises:
+            NoDeviceError: The wanted device is missing.
+        """
         if self._chosen is None:
             self._chosen = self._choose()
         return self._chosen[0]
@@ -161,12 +172,15 @@ class RenderSession:
         return self.device != "blender"
 
     def run(self, function: Callable[..., T], *arguments: object) -> T:
-        """Return the result of a function that uses the device, even if the picture being made is no longer wanted."""
+        """Call a function that uses the device, wait for its turn, and return its result.
+
+        It is not given up where the picture being made is no longer wanted.
+        """
         with stopping.once(stopping.never):
             return self._submit(function, *arguments).result()
 
     def _submit(self, function: Callable, *arguments: object) -> Work:
-        """Call a function that uses the device, after those submitted before."""
+        """Have a function that uses the device called, after earlier ones on the device's thread, or here at once."""
         ended = threading.Event()
         if self.threaded:
             with suppress(RuntimeError):  # at Python's exit, threads take no more work
@@ -176,7 +190,12 @@ class RenderSession:
         return Work(done, ended)
 
     def picture(self, request: Request) -> np.ndarray:
-        """Return the picture, which may have been begun already. StoppedError: it is no longer wanted."""
+        """Return the picture of a request, (H, W, 4), which begin_next may have begun already.
+
+        Raises:
+            effect_source.FAULTS: It cannot be made.
+            StoppedError: It is no longer wanted.
+        """
         key, begun = self._begun.pop(request.source.scene, (None, None))
         if begun is not None and key != request.key:
             begun.break_off()
@@ -187,9 +206,12 @@ class RenderSession:
         return self._submit(self.renderer(request.source).picture, request)
 
     def begin_next(self, snapshot: Snapshot, frame: float, context: RenderContext) -> None:
-        """Begin the picture after the one at a timeline frame, if the last two were neighbors in a film.
+        """Begin the picture of a film's next frame, if the last two pictures were of successive frames.
 
-        It is used only if the same picture is asked for next.
+        It is used only if exactly this picture is asked for next.
+
+        Args:
+            frame: Timeline frame of the last picture.
         """
         if not self.threaded:
             return
@@ -201,15 +223,21 @@ class RenderSession:
                 self._begun[snapshot.scene] = request.key, self._begin(request)
 
     def last_detail(self, scene: int) -> Detail:
-        """Return the detail of an effect scene's last pictures."""
+        """Return the detail of an effect's last pictures; without any, full detail.
+
+        Args:
+            scene: session_uid of the effect scene.
+        """
         known = self._renderers.get((scene, False)) or self._renderers.get((scene, True))
         return known[0].detail if known else FULL
 
     def renderer(self, key: SourceKey, say: Say = print) -> Renderer:
-        """Return the renderer of a key. An effect keeps at most two, for plain and smooth pictures.
+        """Return the renderer for a key, opened if necessary.
+
+        An effect may have two: one with moments between frames, and one without.
 
         Raises:
-            effect_source.FAULTS: The picture cannot be made.
+            effect_source.FAULTS: The device or the footage cannot be opened.
         """
         compositor = self._opened(say)
         known = self._renderers.pop(key.place, None)
@@ -225,12 +253,16 @@ class RenderSession:
         return known[1]
 
     def open_renderer(self, key: SourceKey) -> Renderer | None:
-        """Return the renderer of a key, if it is open, else None."""
+        """Return the renderer for a key if it is open, else None."""
         known = self._renderers.get(key.place)
         return known[1] if known and known[0] == key else None
 
     def _opened(self, say: Say) -> Any:
-        """Return the compositor, opened if necessary."""
+        """Return the compositor, opened if necessary.
+
+        Args:
+            say: Called with why it is on a lesser device than wanted.
+        """
         if self._compositor is None:
             with stopping.once(stopping.never):
                 self._compositor = self._submit(available.OPEN[self.device], render_settings.memory(), self._ask).future
@@ -243,7 +275,7 @@ class RenderSession:
             raise
 
     def _ask(self) -> None:
-        """Let other sessions free their memory; this one's is in use."""
+        """Have other sessions free their GPU memory. This session's is in use and stays."""
         self._frees_others = True
         try:
             self._ask_others()
@@ -251,14 +283,14 @@ class RenderSession:
             self._frees_others = False
 
     def free(self) -> None:
-        """Free the renderers' memory on the device, unless this session asks for room itself. They load it again."""
+        """Free the renderers' GPU memory, unless this session itself asks for room. They load frames again later."""
         if self._frees_others:
             return
         for _key, renderer in list(self._renderers.values()):
             self.run(renderer.release)
 
     def rest(self) -> None:
-        """Break off begun pictures, and stop decoding in advance."""
+        """Stop making the next picture and reading frames ahead."""
         self._drop_begun(list(self._begun))
         for _key, renderer in list(self._renderers.values()):
             renderer.source.want(())
@@ -270,7 +302,7 @@ class RenderSession:
                 begun.break_off()
 
     def keep(self, scenes: set[int]) -> None:
-        """Close the renderers of scenes other than these session_uids. A render job may remove some meanwhile."""
+        """Close the renderers of all effects but those whose effect scenes have these session_uids."""
         self._drop_begun(set(self._begun) - scenes)
         for place in [place for place in (*self.requests, *self._renderers) if place[0] not in scenes]:
             self.requests.pop(place, None)
@@ -279,7 +311,7 @@ class RenderSession:
                 self._submit(renderer.close)
 
     def forget(self) -> None:
-        """Close all sources and free the device; Blender's GPU, once it is current."""
+        """Close all footage and free the device. Blender's GPU is freed when it can next be used."""
         self.keep(set())
         while self._renderers:  # a render job may open more meanwhile
             self.keep(set())
@@ -292,7 +324,7 @@ class RenderSession:
         self._chosen = None
 
     def close_if_device_changed(self) -> None:
-        """Forget everything if another device would be chosen now."""
+        """Close everything (`forget`) if another device would be chosen now, as after a change of the preferences."""
         with suppress(NoDeviceError):  # raised again when a picture is asked for
             if self._chosen is None or self._chosen[0] == self._choose()[0]:
                 return

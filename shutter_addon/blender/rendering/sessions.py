@@ -1,4 +1,4 @@
-"""The sessions: one for the window, one for renders, and one for renders that the window waits for.
+"""The three render sessions: for the window, for renders, and for renders that the window waits for.
 
 The engine, the draw handler, commands and the feed of a film get a RenderContext here once, and pass it on.
 """
@@ -24,9 +24,9 @@ class _Sessions(NamedTuple):
     """The sessions.
 
     Attributes:
-        offscreen: Of renders.
-        window: Of previews.
-        waited_for: Of a thread that the window waits for, where `offscreen` would need the window's GPU.
+        offscreen: For renders.
+        window: For previews.
+        waited_for: For a thread that the window waits for (Where.WAITED_FOR), if `offscreen` uses the window's GPU.
     """
 
     offscreen: RenderSession
@@ -35,13 +35,13 @@ class _Sessions(NamedTuple):
 
 
 def _ask_window() -> None:
-    """In a render job, free the memory of Blender's window. It is not drawn until it loads its frames again."""
+    """On a job's thread, free the GPU memory of the window's previews, which load frames again when drawn."""
     if render_job.where() is Where.JOB:
         main_thread.ask(SESSIONS.window.free, _ANSWER)
 
 
 def _ask_offscreen() -> None:
-    """Free what renders keep for the next one, unless one runs."""
+    """Free the GPU memory that renders keep for the next one, unless one is running."""
     if not render_job.runs():
         SESSIONS.offscreen.free()
 
@@ -57,17 +57,24 @@ SESSIONS = _Sessions(
 
 
 def of_drawing() -> RenderContext:
-    """Return the context of what is drawn on the main thread; without a window, a script draws."""
+    """Return the context for what is drawn on the main thread: previews, or a script's drawing without a window."""
     return RenderContext(SESSIONS.window) if render_job.where() is Where.WINDOW else of_render()
 
 
 def of_engine(say: Say) -> RenderContext:
-    """Return the context of the engine: a preview where Blender draws, else a render."""
+    """Return the context for a picture that Blender asks the engine for, of a preview or of a render."""
     return of_render(say) if render_job.ends_films() else RenderContext(SESSIONS.window, say)
 
 
 def of_render(say: Say = print, *, levels: bool = False, display: Display | None = None) -> RenderContext:
-    """Return the context of a render, on a device that needs no window. NoDeviceError: there is none."""
+    """Return the context of a render, on a device that does not need a window.
+
+    Args:
+        say, levels, display: As in RenderContext.
+
+    Raises:
+        NoDeviceError: The wanted device is missing.
+    """
     session = SESSIONS.offscreen
     if render_job.where() is Where.WAITED_FOR:
         SESSIONS.waited_for.close_if_device_changed()  # no handler runs when such a film begins
@@ -76,7 +83,7 @@ def of_render(say: Say = print, *, levels: bool = False, display: Display | None
 
 
 def close_if_device_changed() -> None:
-    """Use the device and memory that the user wants now, before a render, on the main thread."""
+    """Close sessions whose device or memory is not what the user wants now. On the main thread, before a render."""
     if render_settings.forget_memory_if_changed():
         forget()
     SESSIONS.waited_for.forget()  # its frames take main memory
@@ -84,21 +91,21 @@ def close_if_device_changed() -> None:
 
 
 def end_job() -> None:
-    """Drop what a window's job has begun, and snapshots. A script's next still may go on from the last one."""
+    """After a render, stop making pictures ahead and forget snapshots. Renderers stay open for the next render."""
     if render_job.where() is Where.JOB:
         SESSIONS.offscreen.rest()
     SESSIONS.offscreen.requests.clear()
 
 
 def drop_removed() -> None:
-    """Close the sources of effect scenes that are gone, and free their frames."""
+    """Close the renderers of effect scenes that do not exist any more."""
     scenes = {scene.session_uid for scene in bpy.data.scenes}
     for session in SESSIONS:
         session.keep(scenes)
 
 
 def forget(*_: object) -> None:
-    """Close all sources and free the devices, when a file is loaded or the extension is disabled."""
+    """Close all sessions, when a file is loaded or the extension is disabled."""
     features.call("forget_pictures")
     for session in SESSIONS:
         session.forget()

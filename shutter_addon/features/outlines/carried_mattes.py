@@ -1,7 +1,8 @@
-"""The mattes of an outline in all frames of its footage.
+"""Make, keep and read the mattes of an outline that is drawn at some frames and tracked through the others.
 
-A matte is carried from the outline's drawings when somebody asks for it, and kept as a file. The file's name has a hash
-of everything that the matte is made of. So after a drawing changes, files that do not depend on it are still used.
+A matte is made by tracking ("carrying") the drawings through the footage when somebody asks for it, and kept as a file.
+The file's name has a hash of everything that the matte is made of. So after a drawing changes, files that do not depend
+on it are still used.
 """
 
 from __future__ import annotations
@@ -45,19 +46,19 @@ Drawings = tuple[tuple[int, outlines.Curves], ...]  # source frames with the cur
 
 
 class CarriedMattes(SourceWrapper):
-    """Makes, keeps and reads mattes (a core.model.mattes.MatteSource). Its frames are the source's filmed frames.
+    """A source of mattes, one for each frame of the footage. They are made when they are first read, and kept as files.
 
-    Close it after use.
+    It implements core.model.mattes.MatteSource. Close it after use.
     """
 
     step = 1
 
     def __init__(self, source: FrameSource, drawings: Drawings, folder: Path | None = None) -> None:
-        """Use mattes that are carried from drawings; see subject_mattes.CarriedFile.
+        """Prepare to make and read the mattes of an outline.
 
         Args:
             source: The footage.
-            drawings: The outline's drawings.
+            drawings: The outline's drawings: frames of the footage with the curves drawn there.
             folder: Where to keep mattes. None: in a temporary folder.
         """
         super().__init__(source)
@@ -85,17 +86,17 @@ class CarriedMattes(SourceWrapper):
         return self._nothing() if matte is None else matte / np.float32(255)
 
     def has(self, index: int) -> bool:
-        """Return whether a frame's matte is ready: its file exists, or no drawing is near, so that it is empty."""
+        """Tell whether a frame's matte is ready: its file exists, or no drawing is near enough, so that it is empty."""
         near = self._near(index)
         return near == (None, None) or derived.size_of(self._path(index, *near)) is not None
 
     def confidence(self, index: int) -> float | None:
-        """Return how sure a frame's matte is (carrying.Carried), or None if it is not kept or no drawing is near."""
+        """Return how sure a frame's matte is, 0 to 1; None: it is not kept, or no drawing is near enough."""
         near = self._near(index)
         return None if near == (None, None) else self._described(self._path(index, *near))
 
     def _described(self, path: Path) -> float | None:
-        """Return the confidence in a file's description, or None if there is no such file of ours."""
+        """Return the confidence, 0 to 1, that a matte's file states; None: it is missing, or of another program."""
         if (image := derived.opened(path, self._spec)) is None:
             return None
         with closing(image):
@@ -106,11 +107,12 @@ class CarriedMattes(SourceWrapper):
             return None
 
     def curves(self, index: int) -> outlines.Curves:
-        """Return the outline at a frame.
+        """Return the outline's curves at a frame, in fractions of the picture.
 
         Returns:
-            The drawing, if there is one at this frame. Otherwise the curves around the matte, or curves that move
-            straight from drawing to drawing while the matte is not kept yet.
+            The drawing, if there is one at this frame. Otherwise the curves around the matte or, while the matte is not
+            kept
+            yet, curves that move straight from drawing to drawing.
 
         Raises:
             MediaError: The matte cannot be read.
@@ -120,11 +122,11 @@ class CarriedMattes(SourceWrapper):
         return traced(self.read(index)) if self.has(index) else outlines.curves(self._straight(index))
 
     def straight(self, index: int) -> np.ndarray:
-        """Return a stand-in for a frame's matte, like `read`: the outline that moves straight between drawings."""
+        """Return a quick stand-in for `read`: the matte of an outline that moves straight between drawings."""
         return outlines.coverage(self._straight(index), self.width, self.height)
 
     def _straight(self, index: int) -> list[np.ndarray]:
-        """Return the strokes of the outline at a frame, if it moves straight from drawing to drawing."""
+        """Return the strokes of an outline that moves straight between drawings, at a frame; []: no drawing is near."""
         near = nearest(index, self._drawings, carrying.FARTHEST)
         ends = [frame for frame in near if frame is not None]
         if not ends:
@@ -134,7 +136,12 @@ class CarriedMattes(SourceWrapper):
         return scribbles.between_strokes(before, behind, share, self.width / self.height)
 
     def _carried(self, index: int, first: int | None, last: int | None) -> np.ndarray | None:
-        """Make a frame's matte and those that are carried with it, and write their files.
+        """Make a frame's matte and those that are made together with it, and write their files.
+
+        Args:
+            index: The frame.
+            first: The nearest frame before it with a drawing; None: there is none.
+            last: The nearest one after it; None: there is none.
 
         Returns:
             The frame's matte, (H, W) uint8.
@@ -148,12 +155,20 @@ class CarriedMattes(SourceWrapper):
 
     @contextmanager
     def _claimed(self, index: int, first: int | None, last: int | None) -> Iterator[np.ndarray | None]:
-        """Wait while another process carries mattes between the two drawings, and keep others away in the context.
+        """Keep other processes from making the mattes between two drawings, within a `with` block.
 
-        The wait ends early when the frame's matte is there.
+        If one makes them now, wait for it first. The wait ends early when the frame's matte is there.
 
-        Returns:
-            A context manager that gives the frame's matte if another process has made it, else None.
+        Args:
+            index: The frame whose matte is wanted.
+            first: The frame of the drawing before it; None: there is none.
+            last: The frame of the drawing after it; None: there is none.
+
+        Yields:
+            The frame's matte, (H, W) uint8, if another process has made it, else None.
+
+        Raises:
+            MediaError: The folder cannot be written to.
         """
         name, path = derived.key({"drawn": self._drawn(first, last)}), self._path(index, first, last)
         with Claims(path.parent, _PATIENCE, _BEAT) as claims:
@@ -172,11 +187,11 @@ class CarriedMattes(SourceWrapper):
         self._shots.close()
 
     def _near(self, index: int) -> tuple[int | None, int | None]:
-        """Return the nearest frames with drawings before and after a frame; see `nearest`."""
+        """Return the nearest frames with drawings before and after a frame, within carrying.FARTHEST (`nearest`)."""
         return nearest(index, self._drawings, carrying.FARTHEST)
 
     def _in_shot(self, index: int, first: int | None, last: int | None) -> tuple[int | None, int | None]:
-        """Return `first` and `last`, each None if it lies in another shot than the frame."""
+        """Return the frames `first` and `last`, each None if a cut lies between it and the frame `index`."""
         if first == last:
             return first, last
         shot = self._shots.around(index, *(index if end is None else end for end in (first, last)))
@@ -184,7 +199,13 @@ class CarriedMattes(SourceWrapper):
         return (first if first in shot else None), (last if last in shot else None)
 
     def _made(self, index: int, first: int | None, last: int | None) -> Iterator[carrying.Carried]:
-        """Yield the mattes that are made together with a frame's (`_span`)."""
+        """Yield the mattes that are made together with a frame's (`_span`).
+
+        Args:
+            index: The frame.
+            first: The frame of the drawing before it, in the same shot; None: there is none.
+            last: The frame of the drawing after it, in the same shot; None: there is none.
+        """
         if first is None and last is None:  # kept as well: else it would be lacking again and again
             yield carrying.Carried(index, np.zeros((self.height, self.width), np.uint8), confidence=1.0)
             return
@@ -204,6 +225,11 @@ class CarriedMattes(SourceWrapper):
 
         Between two drawings, those are all frames there. Beyond the only drawing, they are one or more blocks of BLOCK
         frames from the drawing on, up to carrying.FARTHEST frames.
+
+        Args:
+            index: The frame.
+            first: The frame of the drawing before it; None: there is none.
+            last: The frame of the drawing after it; None: there is none.
         """
         if first is not None and last is not None:
             return range(first + 1, last)
@@ -237,7 +263,7 @@ class CarriedMattes(SourceWrapper):
         return np.zeros((self.height, self.width), np.float32)
 
     def _path(self, index: int, first: int | None, last: int | None) -> Path:
-        """Return the file of a frame's matte that is made from these drawings."""
+        """Return the file of a frame's matte that is made from the drawings at the frames `first` and `last`."""
         key = derived.key({"version": VERSION, "frame": index, "drawn": self._drawn(first, last)})
         name = f"{index:08d}-{key}.png"
         if self._parent and derived.size_of(kept := self._parent / self._folder / name) is not None:
@@ -249,18 +275,22 @@ class CarriedMattes(SourceWrapper):
 
     @cached_property
     def _folder(self) -> str:
-        """Return the name of the folder with this footage's mattes."""
+        """The name of the folder with this footage's mattes."""
         return f"{self.path.stem[:40]}-{derived.key(derived.identity(self._source))}"
 
     def _kept(self, path: Path) -> np.ndarray | None:
-        """Return the matte (H, W) uint8 in a file, or None if the file is missing, damaged or not ours."""
+        """Return the matte (H, W) uint8 in a file; None: it is missing, damaged or not written by this program."""
         samples = derived.read(path, self._spec, CONFIDENCE)
         return None if samples is None else samples[..., 0]
 
 
 @cache
 def _writable(parent: Path | None, name: str) -> Path:
-    """Return a folder for mattes: in the parent or, if that is None or cannot be written to, in a temporary one."""
+    """Return a folder for mattes: in the parent or, if that is None or cannot be written to, in a temporary one.
+
+    Args:
+        name: The folder's name.
+    """
     if parent is not None:
         folder = parent / name
         there = next(filter(os.path.lexists, (folder, *folder.parents)), folder)
@@ -277,7 +307,7 @@ _MAKING = Lock()  # or two threads would each make a folder
 
 @cache
 def _temporary() -> tempfile.TemporaryDirectory:
-    """Return a folder that exists until this program ends.
+    """Return a temporary folder that is removed when this program ends.
 
     Raises:
         MediaError: It cannot be made.
@@ -289,7 +319,7 @@ def _temporary() -> tempfile.TemporaryDirectory:
 
 
 def nearest(index: int, frames: Collection[int], reach: float = math.inf) -> tuple[int | None, int | None]:
-    """Return the nearest of `frames` before and after `index`, each None if there is none within `reach`.
+    """Return the nearest of `frames` before and after `index`, each None if there is none within `reach` frames.
 
     If `index` is one of `frames`, both are `index`.
     """

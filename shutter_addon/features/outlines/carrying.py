@@ -1,18 +1,19 @@
-"""Makes mattes for the frames between two drawings of an outline, by the motion of the footage.
+"""Make the mattes of frames between two drawings of an outline, by following the footage's motion ("carrying").
 
 1. Motion. Dense optical flow from frame to frame is joined. For each pixel of a frame, it gives the matching place in
    each drawing's frame. Other ways to find that place are the flow between the two frames alone, and the motions of the
-   camera and of the subject. A pixel takes another way where its colours match clearly better.
+   camera and of the subject. A pixel takes another way where its colors match clearly better.
 2. Votes. Each way errs by a few pixels, so all places within REACH of the matching place vote on whether the pixel lies
-   inside. A vote weighs more the more alike the colours around both pixels are (non-local means: Buades et al. 2005, "A
+   inside. A vote weighs more the more alike the colors around both pixels are (non-local means: Buades et al. 2005, "A
    non-local algorithm for image denoising"; votes for labels: Coupé et al. 2011, "Patch-based segmentation using expert
    priors"). Both drawings vote. The nearer one has more weight.
 3. Edges. A guided filter fits the result to the edges of the picture (He et al. 2013).
-4. Soft edges. In linear light, a soft or blurred edge is a mixture of the colours on its two sides, so the matte there
-   is a linear function of the colours (Levin et al. 2008, "A closed-form solution to natural image matting"). The matte
+4. Soft edges. In linear light, a soft or blurred edge is a mixture of the colors on its two sides, so the matte there
+   is a linear function of the colors (Levin et al. 2008, "A closed-form solution to natural image matting"). The matte
    becomes that function where the function fits.
 
-Steps 1 and 2 use a working picture of at most WORKING pixels a side. Steps 3 and 4 use the whole picture.
+Steps 1 and 2 use a working picture: the frame reduced to at most WORKING pixels a side. Steps 3 and 4 use the whole
+picture.
 """
 
 from collections.abc import Callable, Iterator
@@ -60,11 +61,11 @@ Places = np.ndarray  # (h, w, 2) float32, x and y in pixels of the working pictu
 
 @dataclass(frozen=True)
 class Drawing:
-    """A drawing of an outline.
+    """An outline as it was drawn at one frame.
 
     Attributes:
-        frame: Its source frame.
-        cover: The share of each pixel of the working picture that it covers, (h, w) float32.
+        frame: Frame of the footage.
+        cover: How much of each pixel of the working picture lies inside it, (h, w) float32, 0 to 1.
     """
 
     frame: int
@@ -73,10 +74,10 @@ class Drawing:
 
 @dataclass(frozen=True)
 class Carried:
-    """A matte that was carried to a frame.
+    """A frame's matte that was made from drawings at other frames.
 
     Attributes:
-        frame: Its source frame.
+        frame: Frame of the footage.
         matte: (H, W) uint8.
         confidence: 0 to 1. From 0.5 on, the matte usually overlaps by more than 75 % with what a person draws.
     """
@@ -91,7 +92,10 @@ Frames = Callable[[int], np.ndarray]
 
 
 def working_size(width: int, height: int) -> tuple[int, int]:
-    """Return the width and height of the working picture, in which flow is found, for a picture's size."""
+    """Return the width and height in pixels of the working picture for a picture of this size.
+
+    Optical flow is found in the working picture, whose longer side has at most WORKING pixels.
+    """
     scale = min(1.0, WORKING / max(width, height))
     return max(round(width * scale), min(width, SLIM)), max(round(height * scale), min(height, SLIM))
 
@@ -99,7 +103,7 @@ def working_size(width: int, height: int) -> tuple[int, int]:
 def carried(frames: Frames, first: Drawing | None, last: Drawing | None, span: range) -> Iterator[Carried]:
     """Yield the mattes of the frames of a span, in order.
 
-    This reads the frames twice, from first to last. It keeps flow and colours of the working picture for each frame.
+    This reads the frames twice, from first to last. It keeps flow and colors of the working picture for each frame.
 
     Args:
         frames: Reads a frame.
@@ -134,11 +138,11 @@ def carried(frames: Frames, first: Drawing | None, last: Drawing | None, span: r
 
 
 def drawn(picture: np.ndarray, cover: np.ndarray) -> np.ndarray:
-    """Return the matte (H, W) uint8 of a drawing in its own frame, refined like carried mattes.
+    """Return the matte (H, W) uint8 of a drawing in its own frame, fitted to the picture's edges like carried mattes.
 
     Args:
         picture: The frame, (H, W, 3) uint8.
-        cover: See Drawing.
+        cover: As in Drawing.
     """
     shown = lab(flow.resized(picture, cover.shape[::-1]))
     return flow.levels(refined(picture, _mixed([_votes(shown, shown, cover, box_around(cover, REACH))], [1.0])))
@@ -146,10 +150,10 @@ def drawn(picture: np.ndarray, cover: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Footage:
-    """The working pictures, by source frame.
+    """The working pictures that were read so far, by frame of the footage.
 
     Attributes:
-        colors: Their colours, as from `lab`.
+        colors: Their colors, from `lab`.
         greys: The same pictures in grey, (h, w) uint8, for optical flow.
         moved: How many pixels each pixel has moved since the frame before, (h, w).
     """
@@ -162,18 +166,18 @@ class _Footage:
         self.colors[frame], self.greys[frame] = lab(picture), cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
 
     def to(self, frame: int, other: int) -> Places:
-        """Return the place in another frame that matches each pixel of a frame."""
+        """Return the place in the frame `other` that matches each pixel of `frame`, by optical flow."""
         grey = self.greys[frame]
         return flow.grid(*grey.shape) + flow.fine_vectors(grey, self.greys[other])
 
     def best(self, joined: Places, frame: int, end: Drawing) -> Places:
         """Return the place in a drawing's frame that matches each pixel of a frame best.
 
-        Compare several candidates by colour: joined flow, flow between the two frames alone, and the affine motions of
-        the background and of the subject. Joined flow counts unless another one is clearly better (BETTER).
+        Several candidates are compared by color: joined flow, flow between the two frames alone, and the affine motions
+        of the background and of the subject. Joined flow counts unless another one is clearly better (BETTER).
 
         Args:
-            joined: The places that joined flow gives.
+            joined: The places that flow joined from frame to frame gives.
             frame: The frame.
             end: The drawing.
         """
@@ -192,12 +196,12 @@ class _Footage:
 def stillness(moved: np.ndarray, colors: np.ndarray, before: np.ndarray) -> np.ndarray:
     """Return how much of the last frame's matte each pixel keeps, (h, w), 0 to QUIET, so that mattes do not flicker.
 
-    Where nothing moves and colours stay, any difference is noise.
+    Where nothing moves and colors stay, any difference between mattes is noise.
 
     Args:
-        moved: How many pixels each pixel has moved.
-        colors: The frame's colours, as from `lab`.
-        before: The colours of the frame before.
+        moved: How many pixels each pixel has moved since the frame before, (h, w).
+        colors: The frame's colors, from `lab`.
+        before: The colors of the frame before.
     """
     still = np.clip(1.5 - moved / np.float32(STILL), 0, 1)
     differ = apart(colors, before)
@@ -206,7 +210,7 @@ def stillness(moved: np.ndarray, colors: np.ndarray, before: np.ndarray) -> np.n
 
 
 def apart(picture: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Return how much the colours (3, h, w) of two pictures differ around each pixel, (h, w)."""
+    """Return how much the colors (3, h, w) of two pictures differ around each pixel, (h, w), in units of CIE Lab."""
     return cv2.blur(np.abs(picture - other).sum(axis=0), (5, 5))
 
 
@@ -214,7 +218,7 @@ def affine(places: Places, where: np.ndarray) -> Places:
     """Fit an affine motion to the places in an area, and return the places that it gives in the whole picture.
 
     Args:
-        places: The places that flow gives.
+        places: The matching places that flow gives.
         where: The area, bool (h, w). If it is too small, `places` is returned.
     """
     grid = flow.grid(*where.shape)
@@ -229,7 +233,14 @@ def affine(places: Places, where: np.ndarray) -> Places:
 def _joined(
     small: Frames, footage: _Footage, reading: range, first: Drawing | None, last: Drawing | None
 ) -> dict[tuple[int, int], Places]:
-    """Join flow from frame to frame. Add the frames to `footage`.
+    """Join optical flow from frame to frame, and add the frames to `footage`.
+
+    Args:
+        small: Reads a frame as working picture.
+        footage: Gets the working pictures.
+        reading: The frames, including those of the drawings.
+        first: The drawing before; None: there is none.
+        last: The drawing after; None: there is none.
 
     Returns:
         {(a drawing's frame, frame): the place in the drawing's frame that matches each pixel of the frame}.
@@ -263,9 +274,9 @@ def _votes(shown: np.ndarray, colors: np.ndarray, cover: np.ndarray, box: Box | 
     """Return votes on whether each pixel of a frame lies inside the outline.
 
     Args:
-        shown: The frame's colours, as from `lab`.
-        colors: The colours of the drawing's frame, carried into this frame.
-        cover: The drawing's cover, carried into this frame.
+        shown: The frame's colors, from `lab`.
+        colors: The colors of the drawing's frame, moved to their matching places in this frame.
+        cover: The drawing's cover, moved in the same way.
         box: Where pixels may lie inside. None: nowhere.
     """
     inside = np.zeros_like(cover)
@@ -292,7 +303,7 @@ def _votes(shown: np.ndarray, colors: np.ndarray, cover: np.ndarray, box: Box | 
 
 
 def _mixed(sides: list[Votes], weights: list[float]) -> np.ndarray:
-    """Return the share of votes for "inside" at each pixel, (h, w).
+    """Return the share of votes for "inside" at each pixel, (h, w), 0 to 1.
 
     Args:
         sides: The votes from each drawing.
@@ -309,7 +320,7 @@ def _confidence(share: np.ndarray, sides: list[Votes]) -> float:
     It is surer the more the subject looks as in one of the drawings, and the more two drawings agree on the matte.
 
     Args:
-        share: As from `_mixed`.
+        share: From `_mixed`.
         sides: The votes from each drawing.
     """
     inside = share > INSIDE
@@ -323,7 +334,7 @@ def _confidence(share: np.ndarray, sides: list[Votes]) -> float:
 
 
 def refined(picture: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Fit a matte to the edges and colours of the whole picture (steps 3 and 4 above).
+    """Make a matte of votes and fit it to the edges and colors of the whole picture (steps 3 and 4 above).
 
     Args:
         picture: (H, W, 3) uint8.
@@ -354,7 +365,7 @@ _LIGHT = (255 * to_linear(np.arange(256) / 255)).astype(np.float32)
 
 
 def _explained(light: np.ndarray, values: np.ndarray, radius: int, coarse: int) -> np.ndarray:
-    """Replace a matte by a linear function of the colours around each pixel, where that function fits.
+    """Replace a matte by a linear function of the colors around each pixel, where that function fits.
 
     Args:
         light: The picture in linear light, (h, w, 3) float32, 0 to 255.
@@ -377,18 +388,18 @@ def _explained(light: np.ndarray, values: np.ndarray, radius: int, coarse: int) 
 
 
 def lab(picture: np.ndarray) -> np.ndarray:
-    """Return the colours of a picture (h, w, 3) uint8 in CIE Lab with L halved, (3, h, w) float32."""
+    """Return the colors of a picture (h, w, 3) uint8 in CIE Lab with L halved, (3, h, w) float32."""
     lab = cv2.cvtColor(picture.astype(np.float32) / 255, cv2.COLOR_RGB2LAB)
     lab[..., 0] /= 2
     return np.ascontiguousarray(lab.transpose(2, 0, 1))
 
 
 def _at(values: np.ndarray, places: Places) -> np.ndarray:
-    """Return the values at some places. Beyond the picture, its edge repeats.
+    """Return the values at some places in a picture. Beyond the picture, its edge repeats.
 
     Args:
         values: (h, w), (h, w, 2) or planes (3, h, w).
-        places: Where to look.
+        places: x and y in pixels for each pixel of the result.
     """
     if values.ndim == 3 and values.shape[0] == 3:
         return np.stack([_at(plane, places) for plane in values])

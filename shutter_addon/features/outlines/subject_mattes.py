@@ -1,10 +1,12 @@
-"""The mattes of a subject in all frames of its footage: found by a network under strokes, carried from there by the
-footage's motion, and corrected by the network again. Drawings overrule both. The network is U²-Net (Qin et al. 2020,
-"U²-Net: Going deeper with nested U-structure for salient object detection").
+"""The mattes of a subject in all frames of its footage.
 
-Frames with strokes or drawings are keyframes. From each of them a chain of mattes goes forth and back, as far as the
-next keyframe or cut. A matte is made of the one before it in its chain, and a file keeps it; so it is the same wherever
-a process begins. Between two keyframes, both chains are mixed in the middle.
+A neural network finds the subject under strokes. From there its matte is carried through the frames by the footage's
+motion, and corrected by the network again. Outlines that the user draws overrule both. The network is U²-Net (Qin et
+al. 2020, "U²-Net: Going deeper with nested U-structure for salient object detection").
+
+Frames with strokes or drawings are keyframes. From each of them a chain of mattes goes forward and backward, as far as
+the next keyframe or cut. A matte is made of the one before it in its chain, and a file keeps it; so it is the same
+wherever a process begins. Between two keyframes, both chains are mixed in the middle.
 """
 
 from __future__ import annotations
@@ -57,12 +59,12 @@ _INPUT = re.compile(r"// <Input> CV_32FC1 \[1 x 3 x (\d+) x (\d+)\]")  # of Open
 
 @dataclass(frozen=True)
 class Found:
-    """A subject in a picture.
+    """A subject that was found in a picture.
 
     Attributes:
-        share: (h, w) float32, 0 to 1, how sure a pixel belongs to it.
-        excluded: (h, w) float32, 0 to 1, what strokes have said that does not.
-        confidence: 0 to 1.
+        share: (h, w) float32, 0 to 1: how sure each pixel belongs to it.
+        excluded: (h, w) float32, 0 to 1: what strokes have marked as not belonging to it.
+        confidence: How sure the whole is, 0 to 1.
     """
 
     share: np.ndarray
@@ -71,7 +73,7 @@ class Found:
 
 
 class Network:
-    """A network with one picture in and one mask out. One thread at a time may use it."""
+    """A neural network that takes one picture and gives one mask. One thread at a time may use it."""
 
     def __init__(self, path: Path) -> None:
         """Read a network from an ONNX file.
@@ -92,11 +94,12 @@ class Network:
         self._height, self._width = map(int, sizes[0])
 
     def answer(self, picture: np.ndarray, share: float = 1.0) -> np.ndarray:
-        """Return how sure the network is (h, w) float32, 0 to 1, that a pixel of a picture (h, w, 3) uint8 belongs to
-        the subject.
+        """Return how sure the network is that each pixel of a picture belongs to the subject, (h, w) float32, 0 to 1.
 
         Args:
-            share: Of the sides of the picture that the network looks at; the smaller, the quicker and coarser.
+            picture: (h, w, 3) uint8.
+            share: Size of the picture that the network sees, as a fraction of its usual size; less is quicker and
+                coarser.
 
         Raises:
             MediaError: The network is of another kind.
@@ -120,7 +123,7 @@ class Network:
         return np.clip(cv2.resize(mask, picture.shape[1::-1], interpolation=cv2.INTER_LINEAR), 0, 1)
 
     def within(self, picture: np.ndarray, box: Box, share: float = 1.0) -> np.ndarray:
-        """Return its answer on a part of a picture; nothing elsewhere."""
+        """Return its answer for the part of a picture inside a box; 0 outside. Arguments as in `answer`."""
         found = np.zeros(picture.shape[:2], np.float32)
         found[box] = self.answer(np.ascontiguousarray(picture[box]), share)
         return found
@@ -130,24 +133,37 @@ class Network:
 
 
 def refined(picture: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Return the matte (H, W) float32 of a picture (H, W, 3) uint8, from how sure (h, w) its pixels are inside."""
+    """Make a matte of how sure pixels are, and fit it to the edges of the whole picture.
+
+    Args:
+        picture: (H, W, 3) uint8.
+        share: (h, w), 0 to 1: how sure each pixel of the working picture is inside.
+
+    Returns:
+        The matte, (H, W) float32, 0 to 1.
+    """
     # Votes have less of what is thin than answers of the network have.
     return carrying.refined(picture, np.maximum(share - np.float32(INSIDE - carrying.INSIDE), 0))
 
 
 def covered(strokes: Sequence[Any], picture: np.ndarray) -> np.ndarray:
-    """Return which pixels (h, w) bool of a picture strokes cover."""
+    """Return which pixels of a picture strokes of the width WIDTH cover, (h, w) bool.
+
+    Args:
+        strokes: Points (n, 2) of each, in fractions of the picture.
+    """
     points = tuple(np.asarray(stroke, np.float64) for stroke in strokes)
     height, breadth = picture.shape[:2]
     return scribbles.rasterise([scribbles.Shape(0, "line", WIDTH, points)], breadth, height) > 0
 
 
 def found(network: Network, picture: np.ndarray, on: np.ndarray, off: np.ndarray) -> Found | None:
-    """Return the subject under strokes; None if there is none.
+    """Find the subject under strokes with the network; None: there is none.
 
     Args:
         picture: (h, w, 3) uint8.
-        on, off: (h, w) bool, what strokes on the subject cover, and strokes on what it is not.
+        on: (h, w) bool, the pixels that strokes on the subject cover.
+        off: (h, w) bool, the pixels that strokes on what it is not cover.
     """
     if not on.any():
         return None
@@ -169,7 +185,15 @@ def found(network: Network, picture: np.ndarray, on: np.ndarray, off: np.ndarray
 
 
 def _sure(share: np.ndarray, on: np.ndarray, box: Box) -> float:
-    """Return how sure the network is of a part, 0 to 1; 0 if no subject is under strokes, less if the box cuts it."""
+    """Return how sure the network is of what it found under strokes, 0 to 1.
+
+    It is 0 if that covers too little of the strokes or nearly the whole picture, and less where the box cuts it off.
+
+    Args:
+        share: The network's answer, (h, w).
+        on: (h, w) bool, the pixels that the strokes cover.
+        box: The part of the picture that the network saw.
+    """
     inside = share > INSIDE
     if inside[on].mean() < TOUCHED or inside.mean() > LARGEST:
         return 0.0
@@ -181,22 +205,33 @@ def _sure(share: np.ndarray, on: np.ndarray, box: Box) -> float:
 
 
 def _confidence(share: np.ndarray, sure: float, agrees: float = 1.0) -> float:
-    """Return how sure a subject is, 0 to 1: less if the network is unsure, motion disagrees, or it is small."""
+    """Return how sure a subject is, 0 to 1: less if the network is unsure, motion disagrees, or it is small.
+
+    Args:
+        share: (h, w), how sure each pixel belongs to it.
+        sure: How sure the network is, 0 to 1.
+        agrees: How far the network agrees with what motion has carried here, 0 to 1.
+    """
     size = np.count_nonzero(share > INSIDE) / SMALL
     return float(_from(sure, UNSURE) * _from(agrees, UNLIKE) * min(size, 1.0) ** 0.5)
 
 
 def _from(value: float, ends: tuple[float, float]) -> float:
-    """Return how far a value is from one end to the other, 0 to 1."""
+    """Return how far a value is on the way from the first of `ends` to the second, 0 to 1."""
     return min(max((value - ends[0]) / (ends[1] - ends[0]), 0.0), 1.0)
 
 
 def without(subject: Found, picture: np.ndarray, on: np.ndarray, off: np.ndarray) -> Found:
-    """Return a subject without what strokes say that it is not: all of a part that is smaller than the rest, or what
-    lies on their side of the edges between them and the strokes on the subject.
+    """Remove from a subject what strokes mark as not belonging to it, and return the rest.
+
+    If they touch a separate part that is smaller than the rest, all of that part is removed. Otherwise what is removed
+    is what lies on their side of the picture's edges between them and the strokes on the subject.
 
     Args:
-        on, off: See `found`; where no stroke is on the subject, what is far from the others is.
+        picture: (h, w, 3) uint8.
+        on: (h, w) bool, the pixels of strokes on the subject. If the touched part has none, what is far from `off`
+            counts.
+        off: (h, w) bool, the pixels of strokes on what the subject is not.
     """
     inside = subject.share > INSIDE
     _, parts = cv2.connectedComponents(inside.astype(np.uint8))
@@ -216,28 +251,36 @@ def without(subject: Found, picture: np.ndarray, on: np.ndarray, off: np.ndarray
 
 
 def _near(where: np.ndarray) -> np.ndarray:
-    """Return what lies in an area (h, w), or beside it."""
+    """Return the pixels of an area (h, w) bool, and those up to SOFT pixels beside it."""
     return cv2.dilate(where.astype(np.uint8), np.ones((2 * SOFT + 1,) * 2, np.uint8)) > 0
 
 
 def _parts_on(answer: np.ndarray, on: np.ndarray) -> np.ndarray:
-    """Return the parts of an answer that lie under strokes."""
+    """Return a network's answer (h, w) with only the connected parts that strokes touch; 0 elsewhere.
+
+    Args:
+        on: (h, w) bool, the pixels that the strokes cover.
+    """
     _, parts = cv2.connectedComponents((answer > INSIDE).astype(np.uint8))
     return _alone(answer, np.isin(parts, np.setdiff1d(parts[on], [0])))
 
 
 def _alone(answer: np.ndarray, keep: np.ndarray) -> np.ndarray:
-    """Return an answer (h, w) with some of its parts alone, (h, w) bool, and their soft edges."""
+    """Return a network's answer (h, w) with only the pixels in `keep` (h, w) bool and the soft edges around them."""
     return np.where(keep | (_near(keep) & (answer <= INSIDE)), answer, np.float32(0))
 
 
 def followed(network: Network, before: np.ndarray, picture: np.ndarray, subject: Found) -> tuple[Found, np.ndarray]:
-    """Return a subject in the frame behind one, carried there by motion and corrected by the network; and the share
-    (h, w) of the matte before that it keeps.
+    """Follow a subject to the next frame of a chain: carry it there by motion, and correct it by the network.
 
     Args:
-        before, picture: (h, w, 3) uint8, the one frame, and the frame behind it.
-        subject: What it is in the one.
+        before: The frame where it is known, (h, w, 3) uint8.
+        picture: The next frame, (h, w, 3) uint8.
+        subject: What it is in the frame `before`.
+
+    Returns:
+        The subject in the next frame, and how much of the matte before each pixel keeps, (h, w), as in
+        carrying.stillness.
     """
     greys = [cv2.cvtColor(each, cv2.COLOR_RGB2GRAY) for each in (before, picture)]
     grid = flow.grid(*subject.share.shape)
@@ -269,11 +312,11 @@ def followed(network: Network, before: np.ndarray, picture: np.ndarray, subject:
 
 
 def _passing(places: carrying.Places, carried: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    """Return how sure it is, 0 to 1, that each pixel (h, w) moves with the ground and not with the subject.
+    """Return how sure it is, 0 to 1, that each pixel (h, w) moves with the background and not with the subject.
 
     Args:
         places: Where each pixel was in the frame before.
-        carried: The subject's share, as motion has it.
+        carried: The subject's share, as motion has carried it here.
         rest: How much a pixel's colors differ from those in its place before.
     """
     fits = [carrying.affine(places, it) for it in (carried < INSIDE, carried >= INSIDE)]
@@ -284,7 +327,11 @@ def _passing(places: carrying.Places, carried: np.ndarray, rest: np.ndarray) -> 
 
 
 def around(where: np.ndarray, room: float) -> Box:
-    """Return the box around an area (h, w), with room on each side: a share of its longest one."""
+    """Return the box around an area (h, w) bool, with room on each side.
+
+    Args:
+        room: The room, as a fraction of the box's longer side.
+    """
     area = where.astype(np.float32)
     tight = box_around(area, reach=0)
     assert tight is not None
@@ -304,10 +351,11 @@ Strokes = Mapping[int, Sequence[Any]]
 
 @dataclass(frozen=True)
 class MarkedSubject:
-    """Strokes on a subject, and on what it is not.
+    """The user's strokes that say what a subject is.
 
     Attributes:
-        strokes, nots: By source frame, arrays of points (n, 2) in fractions of the picture, y up.
+        strokes: On the subject, by frame of the footage: arrays of points (n, 2) in fractions of the picture, y up.
+        nots: On what it is not, likewise.
     """
 
     strokes: Strokes = field(hash=False)
@@ -321,10 +369,11 @@ class MarkedSubject:
 
 @dataclass(frozen=True)
 class CarriedFile:
-    """The mattes of an outline or a subject.
+    """Everything that the mattes of a tracked outline or a subject are made from, as plain data.
 
     Attributes:
-        drawings: By ascending source frame, the curves of each (core.model.outlines).
+        footage: The footage.
+        drawings: By ascending frame of the footage, the curves drawn there (core.model.outlines).
         folder: Where mattes are kept. If it is None or cannot be written to, they are kept while this program runs.
         subject: The strokes of a subject; None: an outline.
         model: The file of the network that finds subjects.
@@ -338,7 +387,11 @@ class CarriedFile:
     model: Path = MODEL
 
     def open(self) -> CarriedMattes:
-        """MediaError: the footage or the network cannot be read, or OpenCV is missing."""
+        """Open the footage, and return the source that makes and reads the mattes.
+
+        Raises:
+            MediaError: The footage or the network cannot be read, or OpenCV is missing.
+        """
         opencv.check("subjects are found by" if self.subject else "outlines are tracked by", "ximgproc")
         if self.subject is None:
             return CarriedMattes(self.footage.open(), self.drawings, self.folder)
@@ -346,7 +399,7 @@ class CarriedFile:
 
 
 class SubjectMattes(CarriedMattes):
-    """The mattes of a subject; see CarriedMattes."""
+    """The mattes of a subject, one for each frame of the footage, made when they are first read (CarriedMattes)."""
 
     def __init__(
         self, source: FrameSource, drawings: Drawings, folder: Path | None, subject: MarkedSubject, model: Path
@@ -367,7 +420,11 @@ class SubjectMattes(CarriedMattes):
         self._before: tuple[int, np.ndarray, np.ndarray] | None = None
 
     def read(self, index: int) -> np.ndarray:
-        """As CarriedMattes.read. MediaError: the network cannot be read, too."""
+        """Return a frame's matte (height, width) float32, 0 to 1. If it is not kept yet, make it and its chain.
+
+        Raises:
+            MediaError: A frame or the network cannot be read, or the folder cannot be written to.
+        """
         index = min(max(index, 0), self.count - 1)
         sides = self._sides(index, makes=True) or []
         mattes = [(self._kept(path), share) for path, share, _sure in sides]
@@ -386,10 +443,13 @@ class SubjectMattes(CarriedMattes):
         return sum(share * sure for _path, share, sure in sides)
 
     def _sides(self, index: int, *, makes: bool = False) -> list[tuple[Path, float, float]] | None:
-        """Return the files that a matte is mixed of, with their shares and confidences; None if one is missing.
+        """Return the files that a frame's matte is mixed of: from the chains of the keyframes on both sides.
 
         Args:
             makes: Make what is missing.
+
+        Returns:
+            For each chain the file, its share of the matte and its confidence, both 0 to 1; None: a file is missing.
         """
         ends = sorted({end for end in self._near(index) if end is not None}, key=lambda end: abs(end - index))
         span = sum(abs(end - index) for end in ends)
@@ -410,11 +470,11 @@ class SubjectMattes(CarriedMattes):
         return [(path, weight / total, sure) for path, weight, sure in sides]
 
     def _sure(self, index: int, end: int) -> float | None:
-        """Return the confidence of a frame's matte in the chain of a keyframe; None if it is not kept."""
+        """Return the confidence of a frame's matte in the chain of the keyframe `end`; None: it is not kept."""
         return self._described(self._path(index, end, None))
 
     def _make(self, index: int, end: int) -> None:
-        """Make the mattes of a chain from the last one on that is kept."""
+        """Make the mattes of a chain from its keyframe `end` to a frame, after the last one that is kept."""
         step = 1 if index > end else -1
         start = index
         while start != end and self._sure(start, end) is None:
@@ -433,7 +493,11 @@ class SubjectMattes(CarriedMattes):
         write_levels(self._path(frame, end, None), levels, f"{CONFIDENCE}{sure:.3f}")
 
     def _first(self, frame: int) -> tuple[np.ndarray, np.ndarray, float]:
-        """Return the matte (H, W) of a keyframe, what is excluded from it (h, w), and its confidence."""
+        """Make the matte of a keyframe, with which a chain begins.
+
+        Returns:
+            The matte (H, W), what is excluded from it (h, w), and its confidence, 0 to 1.
+        """
         picture, small = self._pictures(frame)
         nothing = np.zeros(small.shape[:2], np.float32)
         if frame in self._drawings:
@@ -447,7 +511,16 @@ class SubjectMattes(CarriedMattes):
         return refined(picture, what.share), what.excluded, what.confidence
 
     def _next(self, before: int, frame: int, end: int) -> tuple[np.ndarray, np.ndarray, float]:
-        """As `_first`, of the frame behind one in a chain."""
+        """Make the matte of the next frame in a chain from the one before, which is kept.
+
+        Args:
+            before: The frame whose matte is kept.
+            frame: The next frame.
+            end: The keyframe with which the chain begins.
+
+        Returns:
+            The matte (H, W), what is excluded from it (h, w), and its confidence: 0 to 1, or GONE behind a cut.
+        """
         path = self._path(before, end, None)
         matte, sure = self._kept(path), self._described(path)
         low, high = sorted((before, frame))
@@ -464,7 +537,7 @@ class SubjectMattes(CarriedMattes):
         return found_there, what.excluded, min(what.confidence, self._sure(end, end) or 0.0)
 
     def _pictures(self, frame: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return a frame's picture, and a smaller one. That of the frame before is remembered."""
+        """Return a frame as displayed, (H, W, 3) uint8, and as working picture (h, w, 3). The last one is kept."""
         if self._before is None or self._before[0] != frame:
             picture = self._picture(frame)
             small = flow.resized(picture, carrying.working_size(self.width, self.height))
@@ -472,7 +545,7 @@ class SubjectMattes(CarriedMattes):
         return self._before[1:]
 
     def _carried_to(self, frame: int) -> Found:
-        """Return the subject in a frame as it is without the strokes there."""
+        """Return the subject in a frame that has only strokes on what it is not, as it would be without these."""
         nots = {each: strokes for each, strokes in self._subject.nots.items() if each in self._showing}
         drawings, subject = tuple(self._drawings.items()), replace(self._subject, nots=nots)
         mattes = SubjectMattes(self._source, drawings, self._parent, subject, self._model)
@@ -491,7 +564,11 @@ class SubjectMattes(CarriedMattes):
 
 
 def mixed(mattes: list[tuple[np.ndarray, float]]) -> np.ndarray:
-    """Return the mean (H, W) of one or two mattes by their shares, less soft where they differ."""
+    """Return the weighted mean (H, W) of one or two mattes, with steeper edges where they differ.
+
+    Args:
+        mattes: Each with its weight.
+    """
     if len(mattes) == 1:
         return mattes[0][0] * np.float32(mattes[0][1] > 0)
     (one, share), (other, rest) = mattes
@@ -501,5 +578,5 @@ def mixed(mattes: list[tuple[np.ndarray, float]]) -> np.ndarray:
 
 
 def _fitted(values: np.ndarray, matte: np.ndarray) -> np.ndarray:
-    """Return values (h, w) for each pixel of a matte (H, W)."""
+    """Return values (h, w) enlarged to the size of a matte (H, W)."""
     return cv2.resize(values, matte.shape[::-1])

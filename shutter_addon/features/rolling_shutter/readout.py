@@ -1,4 +1,4 @@
-"""Measures the readout time of a rolling shutter by lines that lean as they move. No bpy.
+"""Measure the readout time of a rolling shutter from footage, by lines that lean as they move. No bpy.
 
 A row at height y of H is filmed y/H of the readout after the first one. So a line that moves sideways by v pixels per
 frame leans by v · readout / H more than its own direction. Nearly upright edges are followed from frame to frame. A
@@ -44,16 +44,16 @@ UNLIKE = "lines do not lean as one readout would have them"
 
 
 def of_source(source: FrameSource, indices: Sequence[int], *, columns: bool = False) -> float:
-    """Return the readout of a source in frames; negative if the last row is read first.
+    """Return the readout time of footage in frames; negative if the last row is read first.
 
     Args:
-        source: the footage
-        indices: successive filmed frames of a shot, FRAMES are enough
-        columns: the sensor reads column by column, from the left
+        source: The footage.
+        indices: Successive frames of it in one shot; FRAMES are enough.
+        columns: The sensor reads column by column, from the left.
 
     Raises:
-        ReadoutError: it cannot be measured
-        MediaError: the frames cannot be read, or OpenCV is missing
+        ReadoutError: It cannot be measured.
+        MediaError: The frames cannot be read, or OpenCV is missing.
     """
     opencv.check("the readout is found by")
     source.want(indices)
@@ -61,7 +61,11 @@ def of_source(source: FrameSource, indices: Sequence[int], *, columns: bool = Fa
 
 
 def of_pictures(pictures: Sequence[np.ndarray]) -> float:
-    """Return the readout of successive pictures (H, W) uint8, as of_source."""
+    """Return the readout time in frames, as of_source, from successive grey pictures (H, W) uint8.
+
+    Raises:
+        ReadoutError: It cannot be measured.
+    """
     if len(pictures) < _SAMPLES + 2:
         raise ReadoutError(TOO_FEW_FRAMES)
     if min(pictures[0].shape) < flow.SMALLEST:
@@ -74,12 +78,12 @@ def of_pictures(pictures: Sequence[np.ndarray]) -> float:
 
 @dataclass
 class _Edge:
-    """An edge that is followed through frames.
+    """A nearly upright edge that is followed from picture to picture.
 
     Attributes:
-        rows: the rows that it crosses
-        polarity: 1 if it is lighter on the right, −1 on the left
-        places: for each frame, its x in the middle row and its lean: pixels to the right per row
+        rows: The rows that it crosses.
+        polarity: 1 if it is lighter on the right, −1 on the left.
+        places: For each picture, its x in the middle row, and its lean: pixels to the right per row down.
     """
 
     rows: np.ndarray
@@ -87,21 +91,21 @@ class _Edge:
     places: list[tuple[float, float]] = field(default_factory=list)
 
     def samples(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """Return speeds in pixels per frame and leans in pixels per row, (n,) each. None: there are too few."""
+        """Return its speeds in pixels per frame and leans in pixels per row, (n,) each; None: too few places."""
         if len(self.places) < _SAMPLES + 2:
             return None
         x, lean = np.array(self.places).T
         return _speeds(x)[1:-1], lean[1:-1]
 
     def at(self, x: float, lean: float) -> np.ndarray:
-        """Return the x of its rows (n,)."""
+        """Return its x in each of its rows (n,), if it has this x in the middle row and this lean."""
         return x + lean * (self.rows - self.rows.mean())
 
 
 def _speeds(x: np.ndarray) -> np.ndarray:
-    """Return speeds (n,) in pixels per frame along the natural cubic spline through x (n,).
+    """Return speeds (n,) in pixels per frame along the natural cubic spline through positions x (n,).
 
-    For shaking hands, differences of neighbors are too small by a fifth.
+    With shaking hands, differences of neighbors would be too small by a fifth.
     """
     of = 4 * np.eye(len(x)) + np.eye(len(x), k=1) + np.eye(len(x), k=-1)
     of[[0, -1], [0, -1]] = 2
@@ -110,7 +114,7 @@ def _speeds(x: np.ndarray) -> np.ndarray:
 
 
 def _followed(pictures: Sequence[np.ndarray]) -> list[_Edge]:
-    """Return the edges of pictures, each followed while it is visible."""
+    """Return all edges that are found in pictures, each followed for as long as it is visible."""
     edges: list[_Edge] = []
     seen: list[_Edge] = []  # those visible in the last picture
     for index, picture in enumerate(pictures):
@@ -126,13 +130,18 @@ def _followed(pictures: Sequence[np.ndarray]) -> list[_Edge]:
 
 
 def _steepness(picture: np.ndarray) -> np.ndarray:
-    """Return the horizontal gradient (H, W)."""
+    """Return the horizontal gradient of a grey picture, (H, W) float32, in levels per pixel."""
     smooth = cv2.GaussianBlur(picture.astype(np.float32), (5, 1), 0.8, sigmaY=1e-6)
     return cv2.filter2D(smooth, -1, np.array([[-0.5, 0, 0.5]], np.float32), borderType=cv2.BORDER_REPLICATE)
 
 
 def _follow(edge: _Edge, vectors: np.ndarray, steepness: np.ndarray) -> bool:
-    """Follow an edge into the next picture. Return whether it is visible there."""
+    """Follow an edge into the next picture, and add its place there. Return whether it is visible there.
+
+    Args:
+        vectors: Horizontal optical flow from the last picture, (H, W), in pixels.
+        steepness: Horizontal gradient of the next picture.
+    """
     x, lean = edge.places[-1]
     columns = np.clip(np.rint(edge.at(x, lean)).astype(int), 0, vectors.shape[1] - 1)
     moved = float(np.median(vectors[edge.rows, columns]))
@@ -142,7 +151,11 @@ def _follow(edge: _Edge, vectors: np.ndarray, steepness: np.ndarray) -> bool:
 
 
 def _new(seen: list[_Edge], picture: np.ndarray, steepness: np.ndarray) -> list[_Edge]:
-    """Return the longest new edges of a picture."""
+    """Return edges of a picture that are not among those seen already, the longest first.
+
+    Args:
+        steepness: The picture's horizontal gradient.
+    """
     new: list[_Edge] = []
     for x0, y0, x1, y1 in _segments(picture):
         if len(seen) + len(new) >= MOST:
@@ -160,7 +173,11 @@ def _new(seen: list[_Edge], picture: np.ndarray, steepness: np.ndarray) -> list[
 
 
 def _is_same(edge: _Edge, place: tuple[float, float], other: _Edge) -> bool:
-    """Return whether an edge coincides with another one of the same polarity in their common rows."""
+    """Tell whether a new edge coincides with a known one of the same polarity in their common rows.
+
+    Args:
+        place: x and lean of the new edge, as in _Edge.places.
+    """
     if edge.polarity != other.polarity or not np.intersect1d(edge.rows, other.rows).size:
         return False
     x, lean = other.places[-1]
@@ -182,7 +199,12 @@ def _segments(picture: np.ndarray) -> np.ndarray:
 
 
 def _placed(edge: _Edge, expected: tuple[float, float], steepness: np.ndarray) -> tuple[float, float] | None:
-    """Find an edge near an expected place (_Edge.places). None: it is not visible."""
+    """Find an edge near an expected place, and return its x and lean; None: it is not visible.
+
+    Args:
+        expected: x and lean, as in _Edge.places.
+        steepness: The picture's horizontal gradient.
+    """
     place = expected
     for reach in (_REACH, _NEAR, _NEAR):
         centres, is_there = _centres(edge, place, steepness, reach)
@@ -196,7 +218,15 @@ def _placed(edge: _Edge, expected: tuple[float, float], steepness: np.ndarray) -
 def _centres(
     edge: _Edge, place: tuple[float, float], steepness: np.ndarray, reach: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Find an edge in each of its rows, within `reach` pixels: its x (n,), and whether it is there (n,)."""
+    """Find an edge in each of its rows, within `reach` pixels of a place.
+
+    Args:
+        place: x and lean, as in _Edge.places.
+        steepness: The picture's horizontal gradient.
+
+    Returns:
+        Its x in each row (n,), and whether it was found there (n,).
+    """
     width = steepness.shape[1]
     middle = np.rint(edge.at(*place)).astype(int)
     columns = middle[:, None] + np.arange(-reach, reach + 1)
@@ -211,7 +241,12 @@ def _centres(
 
 
 def _line(rows: np.ndarray, centres: np.ndarray, is_there: np.ndarray) -> tuple[float, float]:
-    """Return a robust line through places in rows, as in _Edge.places."""
+    """Fit a line to an edge's places in its rows, robustly, and return its x in the middle row and its lean.
+
+    Args:
+        centres: x in each row (n,).
+        is_there: Whether each was found (n,).
+    """
     points = np.column_stack([centres, rows - rows.mean()])[is_there].astype(np.float32)
     right, down, x, y = cv2.fitLine(points, cv2.DIST_WELSCH, _ROUGH, 1e-3, 1e-4).ravel()
     lean = right / down
@@ -219,7 +254,15 @@ def _line(rows: np.ndarray, centres: np.ndarray, is_there: np.ndarray) -> tuple[
 
 
 def _fitted(samples: list[tuple[np.ndarray, np.ndarray]], height: int) -> float:
-    """Return the readout from speeds and leans of edges, each with its own direction."""
+    """Return the readout time in frames from speeds and leans, by a robust regression with a direction for each edge.
+
+    Args:
+        samples: Speeds in pixels per frame and leans in pixels per row of each edge.
+        height: Rows of the pictures.
+
+    Raises:
+        ReadoutError: It is not certain.
+    """
     speeds, leans = (np.concatenate(part) for part in zip(*samples, strict=True))
     of = np.repeat(np.arange(len(samples)), [len(speed) for speed, _lean in samples])
     leans = leans * height
@@ -242,5 +285,9 @@ def _fitted(samples: list[tuple[np.ndarray, np.ndarray]], height: int) -> float:
 
 
 def _without_mean(values: np.ndarray, weight: np.ndarray, of: np.ndarray) -> np.ndarray:
-    """Return values (n,) minus the mean of the same edge."""
+    """Return values (n,) minus the weighted mean of the values of the same edge.
+
+    Args:
+        of: The edge's index for each value (n,).
+    """
     return values - (np.bincount(of, weight * values) / np.bincount(of, weight))[of]

@@ -1,7 +1,7 @@
-"""Smooth exposures: a source with moments between its frames, found by optical flow.
+"""Smooth exposures: a source of frames that adds moments between the footage's frames, made by optical flow.
 
 The flow of a pair of frames is found when its first moment is read, on the thread that decodes ahead (media/prefetch).
-Moments are never kept on disk, but vectors may be (derived.StoredVectors).
+Moments are never kept on disk, but flow vectors may be (derived.StoredVectors).
 
 This module also measures how far footage moves from frame to frame. That tells whether an exposure over several frames
 streaks or shows copies side by side.
@@ -48,10 +48,10 @@ _FRAMES = MOST + 2  # frames that are kept: those that say what repeats
 
 
 class Repeats:
-    """Finds frames of a source that repeat the one before.
+    """Finds frames of a source that repeat the one before, as in footage that was converted to a higher frame rate.
 
     The answer for a frame depends only on MOST + 1 frames on each side. The source must keep the frames that it read
-    last. Usually only the neighbours are read, and more frames where something seems to repeat.
+    last. Usually only the neighbors are read, and more frames where something seems to repeat.
     """
 
     def __init__(self, source: FrameSource) -> None:
@@ -60,10 +60,10 @@ class Repeats:
         self._changes: RecentValues[int, float] = RecentValues()
 
     def gap(self, index: int) -> tuple[int, int]:
-        """Return the two frames between which the moments after a frame lie.
+        """Return the two frames from which the pictures between a frame and the next are computed.
 
-        Those are the frame and the next one. Where frames repeat, they are the first of the equal frames and the next
-        different frame of the same shot.
+        Usually these are the frame and the next one. Where frames repeat, they are the first of the equal frames and
+        the next different frame of the same shot.
         """
         first, stop = index, index + 1
         while stop - first <= MOST and self._change(first) <= REPEATED:
@@ -77,7 +77,7 @@ class Repeats:
         return (first, stop) if is_repeated else (index, index + 1)
 
     def _change(self, index: int) -> float:
-        """Return by how many levels a frame differs from the one before.
+        """Return by how many levels of 255 a frame differs from the one before.
 
         Returns:
             Infinity if there is no frame before, or it belongs to another shot. NaN if a frame cannot be read.
@@ -96,7 +96,7 @@ class Repeats:
         return float(np.abs(opencv.cv2.blur(after - before, (_PATCH, _PATCH))).max())
 
     def _picture(self, index: int) -> np.ndarray:
-        """Return a frame in grey and reduced, (h, w) float32."""
+        """Return a frame in grey, reduced to _ROWS rows, (h, w) float32."""
         source = self._source
         return self._pictures.ask(
             index, lambda: flow.of_rows(source.read(index), source, _ROWS).astype(np.float32), _PICTURES
@@ -104,13 +104,13 @@ class Repeats:
 
 
 class SmoothSource(SourceWrapper):
-    """A source with the moments between another source's frames.
+    """A source with the frames of another source and moments between them, which are pictures computed by optical flow.
 
-    Moment i · step is the other source's frame i. Where two frames have nothing in common, as at a cut, a moment
+    Frame i of the other source is at index i · step. Where two frames have nothing in common, as at a cut, a moment
     between them is the nearer frame.
 
     Attributes:
-        step: The number of moments from a frame to the next.
+        step: Indices from a frame of the other source to the next; step − 1 moments lie in between.
         repeats: Whether repeated frames were replaced so far.
     """
 
@@ -121,8 +121,8 @@ class SmoothSource(SourceWrapper):
 
         Args:
             source: The source. `close` closes it.
-            step: The number of moments from a frame to the next.
-            vectors: Gives vectors. None: find them each time.
+            step: Indices from one of its frames to the next.
+            vectors: Finds and stores optical flow. None: find it each time.
             skip_repeats: Replace frames that repeat the one before by moments, evenly spaced between the others.
         """
         self._recent = lru_cache(_FRAMES)(source.read)
@@ -138,7 +138,7 @@ class SmoothSource(SourceWrapper):
         self.repeats = False
 
     def read(self, index: int) -> np.ndarray:
-        """Return a frame or a moment (height, width, 4). It raises what the source's `read` raises."""
+        """Return a frame or a moment, as RGBA (height, width, 4). It raises what the source's `read` raises."""
         return as_rgba(self.decoded(index))
 
     def decoded(self, index: int) -> Decoded:
@@ -154,7 +154,12 @@ class SmoothSource(SourceWrapper):
         return self._moment((filmed, filmed + 1), number) if number else self._source.read(filmed)
 
     def _moment(self, pair: tuple[int, int], number: int) -> Decoded:
-        """Return the moment with this number between two frames; the nearer frame if they have nothing in common."""
+        """Return the picture at a moment between two frames; the nearer frame if they have nothing in common.
+
+        Args:
+            pair: The two frames.
+            number: Which moment, counted from the first frame.
+        """
         steps = (pair[1] - pair[0]) * self.step
 
         def between() -> flow.Between:
@@ -171,12 +176,13 @@ class SmoothSource(SourceWrapper):
 
 
 def steps_for(source: FrameSource, smooth: int | str, window: int, *, skip_repeats: bool = False) -> int:
-    """Return how many moments an effect has from a filmed frame to the next.
+    """Return how many steps (moments) lead from a frame of the footage to the next, for an effect's option *Smooth*.
 
     Args:
-        smooth: as frame_state.Options.step; "auto": as many as the fastest motion of a few pairs of frames needs
-        window: filmed frames of its shutters, all of whose moments have to fit into shutters.MAX_WINDOW
-        skip_repeats: as SmoothSource has it
+        source: The footage.
+        smooth: As frame_state.Options.step; "auto": as many as the fastest motion of a few pairs of frames needs.
+        window: Frames of its shutters, all of whose moments have to fit into shutters.MAX_WINDOW.
+        skip_repeats: As SmoothSource has it.
 
     Returns:
         One of SMOOTH.
@@ -191,7 +197,7 @@ def steps_for(source: FrameSource, smooth: int | str, window: int, *, skip_repea
 
 
 def _fastest(source: FrameSource, skip_repeats: bool) -> float:
-    """Return the fastest motion in a few pairs of neighbouring frames, in pixels per frame."""
+    """Return the fastest motion in a few pairs of neighboring frames, in pixels per frame."""
     filmed = SourceWrapper(source, lru_cache(_FRAMES)(source.read))
     repeats = Repeats(filmed) if skip_repeats else None
     pairs = sorted({(source.count - 2) * k // (_PAIRS - 1) for k in range(_PAIRS)})
@@ -254,7 +260,7 @@ def moved(source: FrameSource, index: int, other: int | None = None) -> Moved | 
 def step(moved: Moved, before: Similarity, after: Similarity) -> float:
     """Return how far the fastest part of a picture moves between two frames, relative to what the exposure follows.
 
-    That is the distance, in heights of the picture, that _SHARE of the points move at least.
+    That is the distance, in heights of the picture, that the fastest _SHARE of the points move at least.
 
     Args:
         moved: The motion from one frame to the other.

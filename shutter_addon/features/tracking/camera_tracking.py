@@ -1,4 +1,4 @@
-"""Tracks the camera by everything that stands still: the whole picture without regions. No bpy.
+"""Track the camera by everything that stands still: the whole picture without regions. No bpy.
 
 Each frame is compared with an anchor frame while enough of that is visible, then with the last frame before, which
 becomes the anchor. So a shaking camera does not drift, and a panning one drifts only with each change of anchor.
@@ -35,10 +35,15 @@ _MARGIN = 0.02  # the margin around regions in heights of the picture: its corne
 
 
 class CameraTrack(tracking.Track):
-    """Tracks the camera."""
+    """Tracks the camera's motion in the picture."""
 
     def __init__(self, camera: Subject, regions: Sequence[Region]) -> None:
-        """Track the camera without what regions cover at any of the frames."""
+        """Prepare to track the camera.
+
+        Args:
+            camera: Gives its location, rotation and scale where tracking starts.
+            regions: What to leave out at each frame, since it may move by itself.
+        """
         super().__init__(camera)
         self._regions = regions
         self._begun: dict[int, Placement] = {}  # {frame where tracking began again: placement}
@@ -47,9 +52,9 @@ class CameraTrack(tracking.Track):
         return self._begun.get(frame) or super()._placement(frame)
 
     def _onward(self, start: int, frames: range) -> Iterator[Tracked]:
-        """Like Track, but go on after a fault from the last placement, where frames can be compared again.
+        """Track away from `start`, but after a fault go on where frames can be compared again, from the last placement.
 
-        At a cut there is no fault, because no window goes across cuts.
+        A cut alone is no fault, because no window goes across cuts.
         """
         last, fault = Tracked(frame=start, placement=self._placement(start), confidence=1.0), None
         for tracked in self._from(start, frames):
@@ -73,7 +78,7 @@ class CameraTrack(tracking.Track):
             yield from self._onward(begin, rest[rest.index(begin) + 1 :])
 
     def _next_begin(self, frames: range) -> int | None:
-        """Return the first frame that can be compared with the next one, or that is the last of its shot."""
+        """Return the first frame that can be compared with the next one, or is the last of its shot; None: none can."""
         self._footage.want(frames)
         for frame, after in zip(frames, [*frames[1:], frames[-1]], strict=True):
             with suppress(TrackingError):
@@ -84,7 +89,11 @@ class CameraTrack(tracking.Track):
         return None
 
     def _part(self, frame: int) -> Part:
-        """Return what stands still in a frame; raise TrackingError if that is too little."""
+        """Return what stands still in a frame: the picture outside the regions.
+
+        Raises:
+            TrackingError: It has too few corners.
+        """
         width, height = self._footage.size
         shapes = [region.at(frame) for region in self._regions]
         shapes = [replace(shape, shutter=0) for shape in shapes if shape.opacity]
@@ -103,16 +112,22 @@ class CameraTrack(tracking.Track):
 
 
 class _Pursuit:
-    """The camera's motion from one frame to the next ones.
+    """The camera's motion from the frame where tracking starts to one frame after another.
 
     Attributes:
-        anchor: the part that frames are compared with, its frame, and the motion from the first frame to it
+        anchor: What stands still in the frame that others are compared with, that frame, and the motion from the first
+            frame to it.
     """
 
     reason = UNLIKE
 
     def __init__(self, part_at: Callable[[int], Part], footage: Footage, frame: int, motion: Motion) -> None:
-        """Start at a frame. part_at: returns what stands still in a frame, or raises TrackingError."""
+        """Start at a frame.
+
+        Args:
+            part_at: Returns what stands still in a frame, or raises TrackingError.
+            motion: What changes, as in Track.follow.
+        """
         self._part_at, self._footage, self._motion = part_at, footage, motion
         self.anchor = part_at(frame), frame, Similarity()
         self._older = deque([self.anchor], 2)  # anchors from some time ago
@@ -121,7 +136,7 @@ class _Pursuit:
         self._speed = Similarity()
 
     def next(self, frame: int) -> FoundMotion | None:
-        """Return the motion to a frame, or None if it is not found."""
+        """Return the motion from the first frame to this one; None: it is not found."""
         picture, (before, known) = self._footage.picture(frame), self._last
         sighting = self._compared(picture, self.anchor)
         if sighting.confidence < _ANEW and before != self.anchor[1] and (anchor := self._anchor_at(before, known)):
@@ -137,10 +152,10 @@ class _Pursuit:
         return sighting._replace(confidence=max((1 - self._doubt) * sighting.confidence, _LEAST))
 
     def _explained(self, picture: np.ndarray, frame: int, motion: Similarity) -> float:
-        """Return how well a motion explains the whole picture, up to 1.
+        """Return how well a motion explains the whole picture, 0 to 1.
 
-        It counts cells of an earlier frame that are elsewhere. Moving things fill few cells; when the camera moves
-        through a scene, many are elsewhere.
+        Parts (cells) of an earlier frame that are not where the motion takes them count against it. Moving things fill
+        few cells; when the camera moves through a scene, many are elsewhere.
         """
         part, _, known = self._older[0]
         points, off = part.astray(picture, motion.after(known.inverse()))
@@ -152,7 +167,10 @@ class _Pursuit:
         return float(np.clip((_MOST - np.mean(astray)) / (_MOST - _FEW), 0, 1)) if astray else 1.0
 
     def _compared(self, picture: np.ndarray, anchor: tuple[Part, int, Similarity]) -> FoundMotion:
-        """Return the motion from an anchor, starting from the last speed."""
+        """Return the motion from the first frame to a picture, found by comparison with an anchor.
+
+        The search starts where the camera would be at its last speed.
+        """
         (part, _, motion), known = anchor, self._last[1]
         match = part.find(picture, self._speed.after(known).after(motion.inverse()), self._motion)
         return FoundMotion(match.motion.after(motion) if match else known, tracking.confidence(match, picture))

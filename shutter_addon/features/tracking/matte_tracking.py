@@ -1,4 +1,4 @@
-"""Tracks what a matte covers, by dense optical flow inside it, from frame to frame. No bpy."""
+"""Track what a matte covers, by dense optical flow inside it, from frame to frame. No bpy."""
 
 from __future__ import annotations
 
@@ -37,24 +37,28 @@ _AGREEING = 0.5  # share of such points from which on a step is sure
 
 
 def cover_within(drawn: Callable[[int], Sequence]) -> Cover:
-    """Return the cover of curves. drawn: returns them at a timeline frame."""
+    """Return a function that gives the matte of drawn curves, for MatteTrack.
+
+    Args:
+        drawn: Returns the curves at a timeline frame.
+    """
     return lambda frame, size: outlines.coverage(drawn(frame), *size)
 
 
 def follow_carried(
     region: Subject, file: SourceFile, shown: Mapping[float, int], *what: Any, **how: Any
 ) -> Iterator[Tracked]:
-    """Yield MatteTrack.follow for a carried outline.
+    """Track what a tracked outline or a subject covers, by its mattes. Yield what MatteTrack.follow yields.
 
     Args:
-        region: the region
-        file: its carried mattes
-        shown: {timeline frame: filmed frame}
-        what: arguments of MatteTrack.follow
-        how: the same
+        region: Gives its center, and its location, rotation and scale where tracking starts.
+        file: Makes and reads its mattes.
+        shown: The frame of the footage for each timeline frame.
+        what: Arguments of MatteTrack.follow.
+        how: Keyword arguments of it.
 
     Raises:
-        MediaError: a matte cannot be carried
+        MediaError: A matte cannot be made.
     """
     with closing(file.open()) as mattes:
 
@@ -65,10 +69,15 @@ def follow_carried(
 
 
 class MatteTrack(tracking.Track):
-    """Tracks what a matte covers."""
+    """Tracks what a region's matte covers, from frame to frame (Track.follow)."""
 
     def __init__(self, region: Subject, cover: Cover) -> None:
-        """Track a matte. region: has its center."""
+        """Prepare to track a region.
+
+        Args:
+            region: Gives its center, and its location, rotation and scale where tracking starts.
+            cover: Gives its matte at a timeline frame.
+        """
         super().__init__(region)
         self._covers = lru_cache(3)(cover)  # each step needs two mattes, one of which the last step had, and the first
 
@@ -82,7 +91,7 @@ class MatteTrack(tracking.Track):
 
 
 class _Pursuit:
-    """The motion of what a matte covers, from one frame to the next ones."""
+    """The motion of what a matte covers, from the frame where tracking starts to one frame after another."""
 
     def __init__(self, cover: Callable[[int], np.ndarray], footage: Footage, frame: int, motion: Motion) -> None:
         self._cover, self._footage, self._asked = cover, footage, motion
@@ -91,7 +100,7 @@ class _Pursuit:
         self._start, self._last, self._motion, self.reason = frame, frame, Similarity(), COVERED
 
     def next(self, frame: int) -> FoundMotion | None:
-        """Return the motion to a frame, or None if the subject is not found."""
+        """Return the motion from the first frame to this one; None: the subject is not found."""
         before, after = (self._cover(each) for each in (self._last, frame))
         if not (after > _INSIDE).any():
             self.reason = LEFT
@@ -105,15 +114,18 @@ class _Pursuit:
         return FoundMotion(self._at_middle() if self._asked == "location" else self._motion, step.confidence)
 
     def _at_middle(self) -> Similarity:
-        """Return how the middle of what the first matte covers has moved."""
+        """Return the motion as a movement alone: how the middle of what the first matte covers has moved."""
         rows, columns = np.nonzero(self._cover(self._start) > _INSIDE)
         middle = complex(columns.mean(), rows.mean())
         return Similarity(1 + 0j, self._motion(middle) - middle)
 
     def _refined(self, motion: Similarity, second: np.ndarray, after: np.ndarray) -> Similarity:
-        """Return a motion since the first frame, compared with that frame, so that steps do not add up to a drift.
+        """Correct a motion since the first frame by comparison with that frame, so that steps do not add up to a drift.
 
-        second, after: the picture and the matte that the motion leads to
+        Args:
+            motion: From the first frame, added up from steps.
+            second: The picture that it leads to, (H, W) uint8.
+            after: The matte of that picture, (H, W) float32.
         """
         there = registration.matrix(motion)
         size = second.shape[1], second.shape[0]
@@ -130,14 +142,14 @@ class _Pursuit:
 def moved(
     first: np.ndarray, second: np.ndarray, before: np.ndarray, after: np.ndarray, motion: Motion
 ) -> FoundMotion | None:
-    """Return how what a matte covers moves from one picture to another, or None if that is unknown.
+    """Return the motion of what a matte covers from one picture to another; None: it is unknown.
 
     Args:
-        first: (H, W) uint8
-        second: (H, W) uint8
-        before: (H, W) float32, 0 … 1, the matte of `first`
-        after: (H, W) float32, 0 … 1, the matte of `second`
-        motion: what changes
+        first: Grey picture, (H, W) uint8.
+        second: Grey picture, (H, W) uint8.
+        before: The matte of `first`, (H, W) float32, 0 to 1.
+        after: The matte of `second`, (H, W) float32, 0 to 1.
+        motion: What may change, one of registration.MOTIONS.
     """
     unit, box = max(first.shape) / 640, box_around(np.maximum(before, after), _AROUND)
     if box is None:

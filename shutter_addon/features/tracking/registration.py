@@ -1,7 +1,8 @@
-"""Finds how a part of a picture moved: corners, Lucas and Kanade's optical flow, RANSAC.
+"""Find how a part of a picture moved: corners, Lucas and Kanade's optical flow, RANSAC.
 
 Pictures are grey, (H, W) uint8. Points are complex: x + iy in pixels, y down, whole numbers at the centers of pixels.
-Results do not depend on the number of threads.
+Motions are similarities (movement, rotation and scale) between such points. Results do not depend on the number of
+threads.
 """
 
 from __future__ import annotations
@@ -39,23 +40,23 @@ _MOST_SCALE, _MOST_TURN = 1.5, 0.8
 
 
 def distances(mask: np.ndarray) -> np.ndarray:
-    """Return the distance of each pixel, in pixels, from where a mask (H, W) bool is true."""
+    """Return the distance of each pixel, in pixels, to the nearest one where a mask (H, W) bool is true."""
     return cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 0)
 
 
 @dataclass(frozen=True)
 class Match:
-    """The place of a part in another picture.
+    """Where a part of one picture was found in another picture.
 
     Attributes:
-        motion: from the part's picture to the other one
-        agreeing: (n,) bool, the corners with this motion
-        seen: (n,) bool, the corners inside the picture
-        share: the agreeing share of the weight of the corners in the picture
-        visible: the share of the corners' weight inside the picture
-        error: the expected error of the part's farthest point in pixels
-        held: the places of the agreeing corners in the other picture
-        likeness: the correlation of the part's pixels with the picture, −1 … 1
+        motion: From the part's picture to the other one.
+        agreeing: (n,) bool: the corners that move like this.
+        seen: (n,) bool: the corners inside the other picture.
+        share: Weight of the agreeing corners, as a fraction of that of the corners inside the picture.
+        visible: Weight of the corners inside the picture, as a fraction of that of all.
+        error: Expected error at the part's farthest point, in pixels.
+        held: Places of the agreeing corners in the other picture.
+        likeness: Correlation of the part's pixels with the picture there, −1 to 1.
     """
 
     motion: Similarity
@@ -69,14 +70,17 @@ class Match:
 
 
 class Part:
-    """A part of a picture with weighted corners. `learn` lowers the weights of corners of the background."""
+    """A part of a picture that can be found in other pictures, by its corners.
+
+    Corners have weights: how much they belong to the part. `learn` lowers those of corners of the background.
+    """
 
     def __init__(self, picture: np.ndarray, weight: np.ndarray) -> None:
-        """Take a part of a picture.
+        """Take a part of a picture, and find its corners.
 
         Args:
-            picture: (H, W) uint8
-            weight: (H, W) float32, 0 … 1: how much each pixel belongs to the part; not 0 everywhere
+            picture: (H, W) uint8.
+            weight: (H, W) float32, 0 to 1: how much each pixel belongs to the part; not 0 everywhere.
         """
         self.weight, self._whole = weight, picture
         x, y, width, height = cv2.boundingRect((weight > 0).astype(np.uint8))
@@ -95,7 +99,15 @@ class Part:
         self._ends = np.array([complex(a, b) for a in (x, x + width) for b in (y, y + height)])
 
     def find(self, picture: np.ndarray, guess: Similarity, motion: Motion) -> Match | None:
-        """Find the part in a picture, near a guess. None: its corners are not found there, or do not agree."""
+        """Find the part in a picture by its corners.
+
+        Args:
+            guess: The motion to expect, from the part's picture to this one.
+            motion: What may change, one of MOTIONS.
+
+        Returns:
+            None if its corners are not found near the guess, or do not agree on a motion.
+        """
         match = self._match(picture, guess, motion)
         for _ in range(2):  # after a bad guess, start again from what was found
             if match is None or np.abs(match.motion(self._ends) - guess(self._ends)).max() < 2:
@@ -105,22 +117,26 @@ class Part:
         return match and replace(match, likeness=self._likeness(picture, match.motion))
 
     def seek(self, picture: np.ndarray, known: Similarity, radius: float) -> Similarity | None:
-        """Return the place in a picture that looks most like the part, as a guess for `find`.
+        """Return the motion to the place in a picture that looks most like the part, as a guess for `find`.
 
         Args:
-            picture: (H, W) uint8
-            known: where it was; turn and scale stay so
-            radius: the search radius in pixels
+            picture: (H, W) uint8.
+            known: Motion to where it was; rotation and scale stay so.
+            radius: How far from there to search, in pixels.
 
         Returns:
-            None if there is no room for the part in the picture
+            None if there is no room for the part in the picture.
         """
         scores, alone, around = self._scores(picture, known, radius)
         _, likeness, _, best = cv2.minMaxLoc(scores)
         return None if likeness <= _NOWHERE else around.inverse().after(Similarity(1, complex(*best))).after(alone)
 
     def lookalike(self, picture: np.ndarray, known: Similarity) -> bool:
-        """Return whether something elsewhere in a picture looks nearly as much like the part as its place `known`."""
+        """Tell whether something elsewhere in a picture looks nearly as much like the part as its place there.
+
+        Args:
+            known: Motion to its place in this picture.
+        """
         scores, _, _ = self._scores(picture, known, max(picture.shape))
         y, x = (length // 2 for length in scores.shape)
         apart = [max(1, round(_SOUGHT / 2 * length / max(self.box[2:]))) for length in self.box[2:]]
@@ -131,11 +147,16 @@ class Part:
     def _scores(
         self, picture: np.ndarray, known: Similarity, radius: float
     ) -> tuple[np.ndarray, Similarity, Similarity]:
-        """Correlate the part with a picture around a known place.
+        """Correlate the part with a picture, at each place around a known one.
+
+        Args:
+            known: Motion to the known place.
+            radius: How far from there, in pixels.
 
         Returns:
             The correlations, with the known place in their middle and _NOWHERE outside the picture; and the motions to
-            the reduced pictures of the part and of its surroundings
+            the
+            reduced pictures of the part and of its surroundings.
         """
         x, y, width, height = self.box
         middle = complex(x + width / 2, y + height / 2)
@@ -155,7 +176,7 @@ class Part:
         return np.where(fits, scores, np.float32(_NOWHERE)), alone, around
 
     def rival(self, radius: float) -> float:
-        """Return how much the surroundings look like the part, up to 1.
+        """Return how much the part's surroundings look like it, 0 to 1. The more, the easier tracking slips onto them.
 
         It is the highest correlation with its own picture, displaced by up to `radius` pixels, outside the peak at no
         displacement; 0 if none is above ALIKE. Shading that is coarser than the windows does not count, since it does
@@ -176,18 +197,25 @@ class Part:
         return float(scores[others].max(initial=0.0))
 
     def astray(self, picture: np.ndarray, known: Similarity) -> tuple[np.ndarray, np.ndarray]:
-        """Return the corners found in a picture, in their own picture, and their distances in pixels from `known`."""
+        """Return how far corners of the part are from where a known motion takes them, in another picture.
+
+        Args:
+            known: The motion to that picture.
+
+        Returns:
+            The corners that are found, in the part's own picture, (n,), and their distances in pixels, (n,).
+        """
         moved, good = self._flow(picture, known)
         good &= inside(picture, known(self.points))
         return self.points[good], np.abs(moved - self.points)[good]
 
     def again(self, picture: np.ndarray, motion: Similarity) -> Part | None:
-        """Return the part as it looks in another picture after a motion, or None if it is outside."""
+        """Return the part as it looks in another picture, where `motion` takes it; None: it is outside."""
         weight = cv2.warpAffine(self.weight, matrix(motion), picture.shape[::-1])
         return Part(picture, weight) if (weight > 0).any() else None
 
     def learn(self, match: Match) -> None:
-        """Adapt the weights of corners to whether they move with the part."""
+        """Adapt the weights of corners to whether they moved with the part in a match."""
         wanted = self._weights * np.where(match.agreeing, 1.0, 0.05)
         self._believed += np.where(match.seen, 0.2 * (wanted - self._believed), 0)
 
@@ -211,14 +239,24 @@ class Part:
         return Match(motion=found, agreeing=agreeing, seen=seen, share=share, visible=visible, error=error, held=held)
 
     def _flow(self, picture: np.ndarray, guess: Similarity) -> tuple[np.ndarray, np.ndarray]:
-        """Trace each corner into a picture that is moved back by a guess, and whether it can be traced back."""
+        """Find each corner in another picture by optical flow, near where a guess takes it.
+
+        Args:
+            guess: The motion to expect.
+
+        Returns:
+            The places (n,), moved back by the guess, and whether flow leads from there back to the corner (n,) bool.
+        """
         size, flags = self._picture.shape[::-1], cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
         back = cv2.warpAffine(picture, matrix(guess, self._origin), size, flags=flags)
         there, is_good = _there_and_back(self._picture, back, self.points - self._origin, self._side)
         return there + self._origin, is_good
 
     def _likeness(self, picture: np.ndarray, motion: Similarity) -> float:
-        """Return the correlation of the reduced part with another picture, as far as it is inside."""
+        """Return the correlation of the part's pixels with another picture where a motion takes them, −1 to 1.
+
+        Both are reduced, and only what is inside that picture counts.
+        """
         x, y, width, height = self.box
         share = min(1.0, _SOUGHT / max(width, height))
         size = max(1, round(share * width)), max(1, round(share * height))
@@ -230,15 +268,15 @@ class Part:
 
 
 def traced(pictures: Sequence[np.ndarray], points: np.ndarray, step: np.ndarray) -> np.ndarray:
-    """Return the places in the last picture of points (n,) in the first one, by flow from picture to picture.
+    """Follow points through pictures by optical flow, and return their places in the last picture.
 
     Args:
-        pictures: (H, W) uint8 each
-        points: (n,)
-        step: (n,) a guess of their motion to the second picture
+        pictures: Successive pictures, (H, W) uint8 each.
+        points: (n,), in the first picture.
+        step: (n,), a guess of their motion to the second picture.
 
     Returns:
-        (n,), NaN for lost points
+        (n,), NaN for points that were lost.
     """
     places = np.full(len(points), complex(np.nan, np.nan))
     left = np.arange(len(points))
@@ -259,14 +297,17 @@ def traced(pictures: Sequence[np.ndarray], points: np.ndarray, step: np.ndarray)
 def _there_and_back(
     first: np.ndarray, second: np.ndarray, points: np.ndarray, side: int, step: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the places of points (n,) in another picture, and whether they can be traced back (n,) bool.
+    """Find points in another picture by optical flow, and check that flow leads back from there.
 
     Args:
-        first: (H, W) uint8
-        second: (H, W) uint8
-        points: (n,) in `first`
-        side: of the compared windows in pixels
-        step: (n,) a guess of their motion
+        first: (H, W) uint8.
+        second: (H, W) uint8.
+        points: (n,), in `first`.
+        side: Of the compared windows, in pixels.
+        step: (n,), a guess of their motion; None: none.
+
+    Returns:
+        Their places in `second` (n,), and whether flow leads back to the points (n,) bool.
     """
     ways = None, None, (side, side), _LEVELS, _UNTIL, cv2.OPTFLOW_USE_INITIAL_FLOW
     start = _pairs(points)
@@ -278,7 +319,7 @@ def _there_and_back(
 
 
 def correlation(first: np.ndarray, second: np.ndarray, weight: np.ndarray) -> float:
-    """Return the weighted correlation of two pictures, −1 … 1. Contrast that may be noise does not count."""
+    """Return the weighted correlation of two pictures, −1 to 1. Differences that may be noise alone do not lower it."""
     total = float(weight.sum(dtype=np.float64))
     if total <= 0:
         return 0.0
@@ -294,14 +335,14 @@ def correlation(first: np.ndarray, second: np.ndarray, weight: np.ndarray) -> fl
 def fit(
     source: np.ndarray, target: np.ndarray, weights: np.ndarray, motion: Motion, tolerance: float
 ) -> tuple[Similarity, np.ndarray] | None:
-    """Fit a similarity to pairs of points by RANSAC, then by least squares.
+    """Fit a similarity to pairs of points: by RANSAC, which ignores those that do not agree, then by least squares.
 
     Args:
-        source: (n,)
-        target: (n,)
-        weights: (n,)
-        motion: what may change
-        tolerance: in pixels
+        source: (n,), the points before.
+        target: (n,), the points after.
+        weights: (n,); points with 0 do not count.
+        motion: What may change, one of MOTIONS.
+        tolerance: Pixels up to which a pair agrees.
 
     Returns:
         The similarity, and which points agree (n,) bool. None: too few agree.
@@ -327,7 +368,14 @@ def fit(
 
 
 def _hypotheses(p: np.ndarray, q: np.ndarray, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
-    """Return turns and shifts (k,) of similarities, each from one or two pairs of points."""
+    """Return candidates for a similarity from points p to points q (n,), each made from one or two pairs.
+
+    Args:
+        motion: What may change, one of MOTIONS.
+
+    Returns:
+        Factors (rotation and scale, as complex numbers) and shifts, (k,) each.
+    """
     count = len(p)
     shifts = (q - p)[:: -(-count // _HYPOTHESES)]
     if motion == "location":
@@ -349,7 +397,11 @@ def _hypotheses(p: np.ndarray, q: np.ndarray, motion: Motion) -> tuple[np.ndarra
 
 
 def least_squares(p: np.ndarray, q: np.ndarray, weights: np.ndarray, motion: Motion) -> Similarity:
-    """Return the best similarity between points, by complex regression."""
+    """Return the similarity from points p (n,) to points q (n,) with the least weighted squares of errors.
+
+    Args:
+        motion: What may change, one of MOTIONS.
+    """
     total = weights.sum()
     middle, target = (weights * p).sum() / total, (weights * q).sum() / total
     turn = 1 + 0j
@@ -365,9 +417,16 @@ def least_squares(p: np.ndarray, q: np.ndarray, weights: np.ndarray, motion: Mot
 def _expected_error(
     points: np.ndarray, off: np.ndarray, weights: np.ndarray, ends: np.ndarray, motion: Motion
 ) -> float:
-    """Return the largest standard error, in pixels, of a fitted motion at the part's ends.
+    """Return the largest standard error, in pixels, of a fitted motion at the ends of a part.
 
     Errors of close corners are correlated, so four corners count as one.
+
+    Args:
+        points: The agreeing corners (n,).
+        off: How far the motion misses each, in pixels (n,).
+        weights: Of the corners (n,).
+        ends: The points to find the error at.
+        motion: What was fitted, one of MOTIONS.
     """
     count = max(len(points) / 4, 1.0)
     variance = float((weights * off**2).sum() / weights.sum()) / count
@@ -380,7 +439,7 @@ def _expected_error(
 
 
 def _corners(picture: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Return the corners (n,) where the weight is above 0. They are stronger than noise, and not too close."""
+    """Return the corners (n,) of a picture where the weight is above 0: stronger than noise, and not too close."""
     mask = (weight > 0).astype(np.uint8)
     apart = max(3.0, np.sqrt(mask.sum() / MOST_CORNERS) * 0.6)
     strength = cv2.cornerMinEigenVal(picture, 5)
@@ -390,7 +449,7 @@ def _corners(picture: np.ndarray, weight: np.ndarray) -> np.ndarray:
 
 
 def plane(places: np.ndarray) -> np.ndarray:
-    """Return points (…, 2) as complex numbers (n,)."""
+    """Return points (…, 2), x and y, as complex numbers (n,)."""
     x, y = places.reshape(-1, 2).astype(np.float64).T
     return x + 1j * y
 
@@ -407,7 +466,7 @@ def inside(picture: np.ndarray, points: np.ndarray, margin: float = 0) -> np.nda
 
 
 def matrix(motion: Similarity, origin: complex = 0) -> np.ndarray:
-    """Return OpenCV's (2, 3) matrix of a motion from a picture that is cropped at `origin`."""
+    """Return a motion as OpenCV's (2, 3) matrix, for points of a picture that was cropped at the point `origin`."""
     shift = motion(origin)
     turn = motion.turn
     return np.array([[turn.real, -turn.imag, shift.real], [turn.imag, turn.real, shift.imag]])

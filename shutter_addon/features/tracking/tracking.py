@@ -1,4 +1,4 @@
-"""Tracks what a region covers through footage, from the frame at which it was drawn. No bpy.
+"""Track what a region covers through footage, from the frame at which it was drawn. No bpy.
 
 Each frame is compared with the first one, so that tracks do not drift. Only where that fails, it is compared with the
 last frame in which the subject was surely found.
@@ -60,14 +60,18 @@ _NONE = np.zeros(0, complex)
 
 
 class TrackingError(MediaError, ValueError):
-    """Nothing can be tracked. The message is one sentence."""
+    """Nothing can be tracked. The message is one sentence, which the interface translates."""
 
 
 @dataclass(frozen=True)
 class Tracked:
-    """A region's placement at a frame, with its confidence, 0 to 1.
+    """Where tracking has placed a region or the camera at a frame, or why it ended there.
 
-    If it has a fault (a sentence), tracking ended before this frame, and the frame gets no key.
+    Attributes:
+        frame: Timeline frame.
+        placement: Location, rotation and scale.
+        confidence: How sure this is, 0 to 1.
+        fault: Why tracking ended before this frame, which then gets no key; "": it did not end.
     """
 
     frame: int
@@ -77,12 +81,12 @@ class Tracked:
 
 
 class FoundMotion(NamedTuple):
-    """A motion from the first picture to another one.
+    """A motion from the first picture to another one that was found by tracking.
 
     Attributes:
         motion: The motion.
-        confidence: 0 to 1.
-        held: The corners in the other picture that agree with it, (n,) complex.
+        confidence: How sure it is, 0 to 1.
+        held: The corners that agree with it, as points in the other picture, (n,) complex.
     """
 
     motion: Similarity
@@ -91,14 +95,21 @@ class FoundMotion(NamedTuple):
 
 
 class PartTracker:
-    """Follows a part of a picture.
+    """Follows a part of a picture from frame to frame.
+
+    It is found by how it looked in the picture where tracking began (its first look) or, where that fails, in the last
+    picture in which it was found (a later look).
 
     Attributes:
-        reason: why it was not found in the last picture
+        reason: Why it was not found in the last picture, one of this module's sentences.
     """
 
     def __init__(self, part: Part, footage: Footage, frame: int, motion: Motion) -> None:
-        """Follow the part from its frame."""
+        """Follow a part from its own picture, which is that of a frame.
+
+        Args:
+            motion: What changes, as in Track.follow.
+        """
         self._first, self._footage, self._motion, self.reason = part, footage, motion, COVERED
         # the motion to the last picture in which it was found, and its last step
         self._known = self._speed = Similarity()
@@ -109,7 +120,7 @@ class PartTracker:
         self._trust = 1.0  # the confidence that this is still the part
 
     def next(self, frame: int) -> FoundMotion | None:
-        """Return its motion to a frame, or None if it is not found."""
+        """Return the part's motion from its own picture to a frame's; None: it is not found."""
         picture, missed = self._footage.picture(frame), self._missed
         sighting = None if missed else self._near(picture, self._speed.after(self._known))
         if sighting is None:
@@ -130,15 +141,16 @@ class PartTracker:
         return FoundMotion(sighting.motion, self._trust)
 
     def _trusted(self, picture: np.ndarray, sighting: FoundMotion, goes_on: bool) -> float:
-        """Return the confidence that this is still the part.
+        """Return how sure it is that what was found is still the part, 0 to 1.
 
-        It stays as before as far as the corners come from the part's last place. If they all do, it is at least the
-        likeness to the first look, unless the part was lost and something else looks like it, too.
+        If only a share of the corners comes from the part's last place, it is that share as sure as before. If all do,
+        it is at least as sure as the likeness to the first look says, unless the part was lost and something else looks
+        like it, too.
 
         Args:
-            picture: the picture
-            sighting: what was found in it
-            goes_on: whether the part was found in the picture before
+            picture: The picture.
+            sighting: What was found in it.
+            goes_on: Whether the part was found in the picture before.
         """
         held = self._held(picture, sighting) if goes_on else None
         kept = _KEPT * self._trust * (_UNTRACED if held is None else held) if goes_on else 0.0
@@ -148,9 +160,9 @@ class PartTracker:
         return kept if was_lost and self._first.lookalike(picture, sighting.motion) else sighting.confidence
 
     def _held(self, picture: np.ndarray, sighting: FoundMotion) -> float | None:
-        """Return the share of its corners that come from its place some pictures before, up to 1.
+        """Return which share of the found corners comes from the part's place some pictures before, 0 to 1.
 
-        They come from elsewhere if tracking slipped onto something else. None: too few can be traced.
+        They come from elsewhere if tracking slipped onto something else. None: too few can be traced back.
         """
         pictures, back = [picture, *(each[0] for each in reversed(self._seen))], sighting.motion.inverse()
         step = self._known.after(back)(sighting.held) - sighting.held
@@ -161,7 +173,7 @@ class PartTracker:
         return min(float((off < _ASTRAY * max(self._first.box[2:])).mean()) / _AGREEING, 1.0)
 
     def _near(self, picture: np.ndarray, guess: Similarity) -> FoundMotion | None:
-        """Find the part near a guess by its first look or, if that is not sure, by a later one."""
+        """Find the part near a guess, by its first look or, if that is not sure, a later one; None: it is not found."""
         match = self._first.find(picture, guess, self._motion)
         sure = confidence(match, picture)
         if match and sure >= SURE:
@@ -190,13 +202,17 @@ class PartTracker:
         return sighting
 
     def _look_anew(self) -> None:
-        """Take its look in the last picture in which it was found."""
+        """Remember how the part looks in the last picture in which it was found."""
         picture, motion, worth = self._seen[-1]
         if later := self._first.again(picture, motion):
             self._look = _Look(later, motion, max(_DRIFT * worth, _LEAST))
 
     def _elsewhere(self, picture: np.ndarray, missed: int) -> FoundMotion | None:
-        """Find the part by its first look or by a later one, in the area where it may be by now."""
+        """Search for a part that was lost, by its first look and a later one, in the area where it may be by now.
+
+        Args:
+            missed: Pictures since it was last found.
+        """
         radius = _AROUND * picture.shape[1] * (1 + missed / 4)
         sightings = []
         for look in (_Look(self._first, Similarity(), 1.0), self._look):
@@ -210,14 +226,25 @@ class PartTracker:
 
 @dataclass(frozen=True)
 class _Look:
-    """How a part looked in a picture, with the motion from the first picture to that one and its confidence."""
+    """How a part looked in one picture.
+
+    Attributes:
+        part: The part, taken from that picture.
+        motion: From the first picture to that one.
+        worth: How sure it is that this was the part, 0 to 1.
+    """
 
     part: Part
     motion: Similarity
     worth: float
 
     def find(self, picture: np.ndarray, guess: Similarity, motion: Motion) -> FoundMotion | None:
-        """Find the part by its motion or, if corners do not agree on that, by its location."""
+        """Find the part in a picture by its motion, or by location alone if corners disagree; None: it is not found.
+
+        Args:
+            guess: Motion to expect from the first picture.
+            motion: What changes, as in Track.follow.
+        """
         guess = guess.after(self.motion.inverse())
         ways: list[tuple[Motion, float]] = [(motion, 1.0), ("location", _SHIFTED)]
         for way, share in ways:
@@ -228,10 +255,13 @@ class _Look:
 
 
 def confidence(match: Match | None, picture: np.ndarray) -> float:
-    """Return the confidence of a match, 0 … 1, from its expected error, the agreeing corners and the likeness of
-    pixels.
+    """Return how sure a match is, 0 to 1; None: 0.
 
-    The more alike the pixels, the fewer corners have to agree.
+    It depends on its expected error, on how many corners agree, and on how alike the pixels are. The more alike they
+    are, the fewer corners have to agree.
+
+    Args:
+        picture: In which the part was found; gives the scale of errors.
     """
     if match is None:
         return 0.0
@@ -242,11 +272,13 @@ def confidence(match: Match | None, picture: np.ndarray) -> float:
 
 
 def lost(frames: np.ndarray, sure: np.ndarray) -> int | None:
-    """Return the frame at which a subject was lost: at the first long stretch of unsure frames. None: nowhere.
+    """Return the frame at which a subject was lost; None: nowhere.
+
+    That is the end of the first long stretch of unsure frames at which sure frames lie.
 
     Args:
-        frames: (n,) ascending
-        sure: (n,) confidences
+        frames: (n,), ascending.
+        sure: (n,), how sure tracking was at each, 0 to 1.
     """
     ends = np.flatnonzero(np.diff(np.concatenate([[False], sure < SURE, [False]])))
     for first, end in ends.reshape(-1, 2):
@@ -256,7 +288,11 @@ def lost(frames: np.ndarray, sure: np.ndarray) -> int | None:
 
 
 def distinctness(part: Part, width: int) -> float:
-    """Return the confidence that a part is not confused with its surroundings, up to 1. width: of the picture."""
+    """Return how sure it is that a part is not confused with its surroundings, _REPEATED to 1.
+
+    Args:
+        width: Of the picture in pixels.
+    """
     return float(np.clip((1 - part.rival(_AROUND * width)) / (1 - registration.ALIKE), _REPEATED, 1))
 
 
@@ -264,41 +300,41 @@ class Pursuit(Protocol):
     """Follows something from frame to frame.
 
     Attributes:
-        reason: why it was not found in the last frame
+        reason: Why it was not found in the last frame.
     """
 
     reason: str
 
     def next(self, frame: int) -> FoundMotion | None:
-        """Return its motion to a frame, or None if it is not found."""
+        """Return its motion from the first frame to this one; None: it is not found."""
 
 
 class Track(ABC):
-    """Tracks a subject, a region or the camera. Call `follow` once."""
+    """Tracks a subject, a region or the camera, through timeline frames. Call `follow` once."""
 
     def __init__(self, subject: Subject) -> None:
-        """Track a subject. Its placement is known at the first frame and at anchors."""
+        """Prepare to track a subject, which says where it is at the frame where tracking starts and at anchors."""
         self._subject = subject
 
     def follow(
         self, footage: Footage, start: int, frames: range, *, motion: Motion = "scale", anchors: Collection[int] = ()
     ) -> Iterator[Tracked]:
-        """Yield placements at timeline frames: at `start`, then after it, then before it.
+        """Yield where the subject is (Tracked) at timeline frames: at `start`, then after it, then before it.
 
         A direction that ends early ends with a Tracked that has a fault. If a gap is left on the way to an anchor,
         there is a fault on each side of it.
 
         Args:
-            footage: the pictures
-            start: the first frame
-            frames: all frames that may be tracked, with `start`
-            motion: what changes: "location", also "rotation", or also "scale"
-            anchors: frames with correct placements. Tracking ends at the nearest one on each side. Frames in between
-                are then yielded again, blended with tracking back from the anchor.
+            footage: The pictures.
+            start: The first frame.
+            frames: All frames that may be tracked, with `start`.
+            motion: What changes: "location", also "rotation", or also "scale".
+            anchors: Frames where the subject's own placement is right. Tracking ends at the nearest one on each side.
+                Frames in between are then yielded again, blended with tracking back from the anchor.
 
         Raises:
-            TrackingError: nothing can be tracked
-            MediaError: a frame cannot be read
+            TrackingError: Nothing can be tracked.
+            MediaError: A frame cannot be read.
         """
         self._footage, self._motion = footage, motion
         centres = {frame: self._subject.centre(frame) for frame in frames}
@@ -314,10 +350,10 @@ class Track(ABC):
 
     @abstractmethod
     def _tracker(self, start: int) -> tuple[Pursuit, float]:
-        """Return the tracker of what `start` shows, and the confidence that this is the subject.
+        """Return what follows the subject shown at the frame `start`, and how sure it is to be the subject, 0 to 1.
 
         Raises:
-            TrackingError: there is nothing to follow
+            TrackingError: There is nothing to follow.
         """
 
     def _both_ways(self, start: int, frames: range, anchors: set[int]) -> Iterator[Tracked]:
@@ -330,15 +366,15 @@ class Track(ABC):
                 yield from self._between(start, anchor)
 
     def _onward(self, start: int, frames: range) -> Iterator[Tracked]:
-        """Track away from `start` in a direction without an anchor."""
+        """Yield where the subject is at frames that lead away from `start`, in a direction without an anchor."""
         return self._from(start, frames)
 
     def _placement(self, frame: int) -> Placement:
-        """Return the placement at a frame where tracking starts."""
+        """Return the subject's placement (location, rotation, scale) at a frame where tracking starts."""
         return self._subject.placement(frame)
 
     def _between(self, start: int, anchor: int) -> Iterator[Tracked]:
-        """Track from `start` to an anchor, then yield frames blended with tracking back."""
+        """Track from `start` to an anchor, then yield the frames between again, blended with tracking back from it."""
         step = 1 if anchor > start else -1
         there, back, faults = {}, {}, []
         for tracked in self._from(start, range(start + step, anchor, step)):
@@ -359,7 +395,7 @@ class Track(ABC):
         yield from (fault for fault in faults if fault.frame not in there | back)
 
     def _from(self, start: int, frames: range) -> Iterator[Tracked]:
-        """Track frames in order, away from `start`."""
+        """Yield where the subject is at frames that lead away from `start`, in order, until lost or at a cut."""
         self._footage.want(frames)
         tracker, worth = self._tracker(start)
         last, shown = Tracked(frame=start, placement=self._placement(start), confidence=1.0), start
@@ -390,7 +426,13 @@ class Track(ABC):
         return motions.unwound(moved, near)
 
     def _bridged(self, last: Tracked, seen: Tracked, lost: list[int]) -> Iterator[Tracked]:
-        """Yield frames without the subject, on a straight path between their neighbors, whatever is redrawn."""
+        """Yield the frames in which the subject was not found, on a straight path between those where it was.
+
+        Args:
+            last: The last frame before in which it was found.
+            seen: The next frame in which it was found.
+            lost: The frames in between.
+        """
         for missing in lost:
             share = (missing - last.frame) / (seen.frame - last.frame)
             centre = (1 - share) * self._centres[last.frame] + share * self._centres[seen.frame]
@@ -400,7 +442,7 @@ class Track(ABC):
 
 
 class RegionTrack(Track):
-    """Tracks what a region covers."""
+    """Tracks what a region's strokes cover, by its corners."""
 
     _subject: Region
 
@@ -409,9 +451,12 @@ class RegionTrack(Track):
         self._parts: dict[int, tuple[Part, float]] = {}  # by start: both directions learn what belongs to it
 
     def _part(self, frame: int) -> tuple[Part, float]:
-        """Return the part of a frame that the region covers, and the confidence that its corners belong to it.
+        """Return the part of a frame that the region covers, and how sure it is that its corners belong to it, 0 to 1.
 
         Corners far from the region may belong to something else; so may those of a repeated pattern.
+
+        Raises:
+            TrackingError: The region is outside the picture, or has too few corners.
         """
         shape, (width, height) = self._subject.at(frame), self._footage.size
         covered = scribbles.rasterise([replace(shape, shutter=0)], width, height) > 0
@@ -435,15 +480,24 @@ class RegionTrack(Track):
 
 
 def _falloff(away: np.ndarray, reach: float) -> np.ndarray:
-    """Return the weights of pixels, 0 … 1 float32, from their distance to a region; 0 beyond the reach."""
+    """Return the weight of pixels, float32, 1 to 0, by their distance to a region.
+
+    Args:
+        away: The distance of each, in pixels.
+        reach: Distance beyond which the weight is 0.
+    """
     return np.where(away <= reach, np.exp(-2 * (away / max(reach, 1e-9)) ** 2), 0).astype(np.float32)
 
 
 def _blended(first: Tracked | None, second: Tracked | None, share: float) -> Tracked | None:
-    """Blend two results for a frame by their confidence, and by the share of the way from the first start to the
-    second.
+    """Blend two results of tracking for the same frame, from two starts. None: there is neither.
 
-    None: there is neither.
+    Each weighs more, the surer it is and the nearer its start.
+
+    Args:
+        first: From the first start; None: not found.
+        second: From the second start; None: not found.
+        share: How far the frame is on the way from the first start to the second, 0 to 1.
     """
     if first is None or second is None:
         return first or second

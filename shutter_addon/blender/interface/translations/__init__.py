@@ -1,4 +1,4 @@
-"""Translations of the interface.
+"""Translations of the interface, by language.
 
 A language is a module with a dictionary in Blender's format: (context, English) to the translation. To add one, copy
 german.py and name it below. tests/blender/test_translations.py lists missing texts.

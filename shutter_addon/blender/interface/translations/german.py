@@ -1,6 +1,6 @@
-"""German, in the terms of Blender's own: strip "Streifen", keyframe "Schlüsselbild", sequencer "Sequenzer".
+"""The German translation, in the terms of Blender's: strip "Streifen", keyframe "Schlüsselbild", sequencer "Sequenzer".
 
-Ours: shutter "Verschluss", bar "Balken", region "Region", scribble "Markierung", recipe "Rezept",
+Terms of the extension: shutter "Verschluss", bar "Balken", region "Region", scribble "Markierung", recipe "Rezept",
 matte "Matte" (Blender's "Maske" is a mask), ramp "Verlauf", time map "Zeitkarte", feather "Weiche Kante".
 """
 

@@ -1,4 +1,4 @@
-"""The command `bake`: the film of one effect of a saved edit, which an ordinary strip shows."""
+"""The command `bake`: render one effect of a saved edit to a film, which an ordinary strip can show."""
 
 import itertools
 import os
@@ -51,14 +51,22 @@ def run(arguments: Namespace) -> None:
 
 
 def _check_parent(film: baked_film.Film) -> None:
-    """Raise InterruptedRenderError if the Blender that started this process has ended, and closed its stdin."""
+    """Check, for a bake that another Blender has started, that this Blender still runs: it holds our stdin open.
+
+    Raises:
+        InterruptedRenderError: It has ended.
+    """
     with suppress(OSError):  # nothing to read: it is still there
         if not os.read(0, 1):
             raise film_output.InterruptedRenderError(f"{film.place}: stopped")
 
 
 def _effect_strip(scene: Scene, name: str) -> tuple[PropertyGroup, Strip]:
-    """Return an effect and its strip. OutputError: the scene has no such strip."""
+    """Return the effect of the strip with this name, and the strip.
+
+    Raises:
+        OutputError: The scene has no such effect strip.
+    """
     for strip in strips.effect_strips(scene):
         if strip.name == name and (effect := strips.effect_of(scene, strip.scene)) is not None:
             return effect, strip

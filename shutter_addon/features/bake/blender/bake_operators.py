@@ -1,4 +1,4 @@
-"""Operators and panel that bake an effect to a strip and unbake it.
+"""Operators and a panel that bake an effect to a strip, which plays without computing the effect, and unbake it.
 
 Baked strips are movie or image strips with a rendered effect, above the muted effect strip. Both strips have the same
 bake identity, which cuts and copies keep.
@@ -36,12 +36,12 @@ FORMATS = (
 
 @dataclass
 class _Bake:
-    """The bake of this Blender.
+    """The state of baking in this Blender.
 
     Attributes:
-        running: the job whose film is wanted.
-        stopped: the last one that ended; it may still be finishing a frame.
-        failure: identity of an effect, and why its bake failed.
+        running: The bake that is running; None: none.
+        stopped: The last bake that was stopped; it may still be finishing a frame.
+        failure: Identity of the effect whose bake failed last, and why.
     """
 
     running: baked_film.BakeJob | None = None
@@ -112,7 +112,7 @@ def unbake(self: Operator, _context: Context, _effect: PropertyGroup) -> None:
 
 
 def _look() -> float | None:
-    """Add the strip of a finished bake."""
+    """Add the baked strip when the running bake has finished, or note why it failed. This is a timer of Blender."""
     if (job := _bake.running) is None:
         return None
     redraw(bpy.context)
@@ -132,7 +132,7 @@ def _look() -> float | None:
 
 
 def _lay(job: baked_film.BakeJob) -> str | None:
-    """Put a finished film above its effect strip. Return why it is impossible, or None."""
+    """Add the baked strip of a bake that has finished. Return why that is impossible; None: it was added."""
     scene = strips.scene_of_uid(job.scene)
     parts = [s for s in strips.effect_strips(scene) if s.scene.virtual_shutter.identity == job.effect] if scene else []
     if not parts:
@@ -147,14 +147,14 @@ def _lay(job: baked_film.BakeJob) -> str | None:
 
 
 def stop() -> None:
-    """End the running bake."""
+    """End the running bake. Finished frames are kept."""
     if (job := _bake.running) is not None:
         _bake.running, _bake.stopped = None, job
         job.end()
 
 
 def forget() -> None:
-    """Stop and forget errors, before another file is loaded."""
+    """End the running bake and forget why one failed, before another file is loaded."""
     stop()
     _bake.failure = "", ""
 
@@ -198,12 +198,12 @@ def _ask_whether_stale() -> None:
 
 
 def add_strip(scene: Scene, strip: Strip, film: baked_film.Film) -> Strip:
-    """Add the baked strip of a finished film above its effect strip, which is muted, and return it.
+    """Add a baked strip that shows a finished film, above the effect strip, which is muted. Return the baked strip.
 
     It replaces the strip of an older bake.
 
     Raises:
-        EffectError: no channel has room.
+        EffectError: No channel has room.
     """
     owner = strip.parent_meta() or scene.sequence_editor
     for older in [baked for baked in baked_of(scene, strip) if strips.overlap(baked, strip)]:
@@ -240,10 +240,10 @@ def add_strip(scene: Scene, strip: Strip, film: baked_film.Film) -> Strip:
 
 
 def _channel(scene: Scene, strip: Strip) -> int:
-    """Return the first unmuted channel with room above an effect strip.
+    """Return the first unmuted channel above an effect strip that has room for a strip of its range.
 
     Raises:
-        EffectError: there is none.
+        EffectError: There is none.
     """
     owner = strip.parent_meta() or scene.sequence_editor
     for channel in range(strip.channel + 1, strips.CHANNELS + 1):
@@ -258,34 +258,37 @@ def _is_free(owner: SequenceEditor | MetaStrip, strip: Strip, channel: int) -> b
 
 
 def _move(owner: SequenceEditor | MetaStrip, strip: Strip, channel: int) -> None:
-    """Move a strip to a channel if there is room. Otherwise Blender would shift it in time."""
+    """Move a strip to a channel, but only if there is room; otherwise Blender would shift it in time."""
     if _is_free(owner, strip, channel):
         strip.channel = channel
 
 
 def _relative(path: Path) -> str:
-    """Return a path relative to the .blend file, so that both can be moved together."""
+    """Return a path relative to the .blend file if possible, so that both can be moved together."""
     with suppress(ValueError):  # on another drive
         return bpy.path.relpath(str(path))
     return str(path)
 
 
 def baked_of(scene: Scene, strip: Strip) -> list:
-    """Return the baked strips of an effect strip that begin with it. Copies that were moved elsewhere do not count."""
+    """Return the baked strips of an effect strip that lie where they were baked. Copies elsewhere do not count."""
     start = round(strips.origin(strip))
     parts = [other for other in selection.of_bake(scene, strip) if other.type in strips.SOURCES]
     return [part for part in parts if round(strips.origin(part)) - part.virtual_shutter_bake.first == start]
 
 
 def effect_parts(scene: Scene, strip: Strip) -> list:
-    """Return the parts that a baked effect strip was cut into, with itself; []: it is not baked."""
+    """Return all parts that a baked effect strip was cut into, itself included; []: it is not baked."""
     start = round(strips.origin(strip))
     parts = (other for other in selection.of_bake(scene, strip) if round(strips.origin(other)) == start)
     return [part for part in parts if part.type == "SCENE"]
 
 
 def is_stale(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
-    """Return whether the baked film is outdated or gone."""
+    """Tell whether an effect has changed since it was baked, or cannot be shown.
+
+    The answer is kept until something changes.
+    """
     place = _place(scene, effect, strip)
     return revision.until_change("bake", place, lambda: effect_version.is_changed(scene, effect, strip))
 

@@ -1,6 +1,6 @@
-"""Baking an effect to a movie or a folder of EXR pictures, which an ordinary strip shows.
+"""Bake an effect: render it to a movie or a folder of EXR pictures, which an ordinary strip can show.
 
-The pictures are the engine's. They bypass the sequencer, which would convert them to its colour space and back, so an
+The pictures are the engine's. They bypass the sequencer, which would convert them to its color space and back, so an
 EXR has the same bits. `render` makes them immediately, and `start` in a second Blender while the editor works on.
 """
 
@@ -42,11 +42,12 @@ Picture = Callable[[int], np.ndarray]  # gives that of a frame
 
 @dataclass(frozen=True)
 class Film:
-    """A film of an effect strip.
+    """The film that baking makes of an effect strip.
 
     Attributes:
+        kind: "MOVIE" or "OPEN_EXR".
         frames: Counted from the strip's origin (effect_version.frames_of).
-        version: The effect's key.
+        version: effect_version.key of the effect.
         place: The movie, or the folder of pictures, numbered from 1.
     """
 
@@ -57,12 +58,12 @@ class Film:
 
     @property
     def pictures(self) -> list[Path]:
-        """The EXR picture of each frame."""
+        """The path of each frame's EXR picture."""
         return [self.place / f"{number:04d}.exr" for number in range(1, len(self.frames) + 1)]
 
     @property
     def parts(self) -> list[tuple[Path, range]]:
-        """The parts from which the movie is joined, and their frames."""
+        """The path and the frames of each short movie that is rendered and then joined to the movie."""
         folder, length = self.place.with_suffix(".parts"), film_parts.LENGTH
         starts = range(0, len(self.frames), length)
         return [
@@ -70,14 +71,18 @@ class Film:
         ]
 
     def is_finished(self) -> bool:
-        """Return whether all of it exists, without decoding pictures."""
+        """Tell whether all of it exists, without decoding pictures."""
         if self.kind == "MOVIE":
             return self.place.is_file() and is_whole_movie(self.place, len(self.frames))
         return all(picture.is_file() and is_whole_picture(picture) for picture in self.pictures)
 
 
 def film_of(scene: Scene, effect: PropertyGroup, strip: Strip, kind: Kind, folder: Path | None = None) -> Film:
-    """Return the film that baking would make of an effect strip, by default beside the .blend file.
+    """Return the film that baking would make of an effect strip.
+
+    Args:
+        kind: "MOVIE" or "OPEN_EXR".
+        folder: Folder of the film; None: FOLDER beside the .blend file.
 
     Raises:
         EffectError, MediaError: The strip cannot be baked.
@@ -95,7 +100,12 @@ def film_of(scene: Scene, effect: PropertyGroup, strip: Strip, kind: Kind, folde
 
 
 def _check(scene: Scene, effect: PropertyGroup, strip: Strip, kind: Kind) -> None:
-    """Raise EffectError if a film would not show what the strip shows."""
+    """Check that a film would show what the strip shows.
+
+    Raises:
+        EffectError: It would not, because of retiming, missing packages, colors or transparency.
+        MediaError: The source cannot be read.
+    """
     if getattr(strip, "retiming_keys", ()) or strip.strobe > 1 or strip.use_reverse_frames:
         raise EffectError(
             rpt_('"{strip}" is retimed, strobed or reversed: do that to its source instead').format(strip=strip.name)
@@ -117,7 +127,7 @@ def _check(scene: Scene, effect: PropertyGroup, strip: Strip, kind: Kind) -> Non
 
 
 def render(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film, report: Callable[[], object]) -> None:
-    """Render what is missing of a film. Finished frames stay when it is stopped or fails.
+    """Render those frames of a film that are missing. Finished frames stay when it is stopped or fails.
 
     Args:
         report: Called after each frame. It may raise to stop.
@@ -178,13 +188,17 @@ def _make_movie(film: Film, picture: Picture, fps: Fraction, report: Callable[[]
 
 
 def _prepare(place: Path) -> None:
-    """Make a folder. OSError: it cannot be made, or is a link that somebody else may have made."""
+    """Make a folder, and remove from it what processes that have ended left unfinished.
+
+    Raises:
+        OSError: It cannot be made, or is a link that somebody else may have made.
+    """
     own_folder(place)
     atomic_write.clear_up(place)
 
 
 def _remove_parts(film: Film) -> None:
-    """Remove the parts of a finished movie and what killed processes left, but no other file."""
+    """Remove the short movies that a finished movie was joined from, and what killed processes left there."""
     parts = [path for path, _frames in film.parts]
     place = parts[0].parent
     with suppress(OSError):
@@ -205,14 +219,16 @@ def _reported(shown: Iterator[np.ndarray], report: Callable[[], object]) -> Iter
 
 @dataclass
 class BakeJob:
-    """A bake in a second Blender, which reads a copy of the edit.
+    """A bake that runs in a second Blender, which reads a copy of the edit.
 
     Attributes:
         scene: session_uid of the edit's scene.
         effect: Identity of the effect.
         strip: Name of its strip.
-        copy: The copy of the edit, which the process removes after reading it.
-        log: A part folder beside the film with the process's output.
+        film: The film that it makes.
+        copy: File of the edit's copy, which the process removes after reading it.
+        log: A temporary folder beside the film with the process's output.
+        process: The second Blender.
     """
 
     scene: int
@@ -224,7 +240,7 @@ class BakeJob:
     process: subprocess.Popen
 
     def done(self) -> int:
-        """Return the number of finished frames."""
+        """Return the number of finished frames, which the process prints."""
         lines = self._said("out").split("\n")[:-1]
         counts = [line.split()[0] for line in lines[-2:] if line.endswith(f" of {len(self.film.frames)}")]
         return int(counts[-1]) if counts else 0
@@ -233,7 +249,7 @@ class BakeJob:
         return self.process.poll() is not None
 
     def failure(self) -> str | None:
-        """Return why it failed, after its end; None: the film is finished."""
+        """Return why the bake has failed, after its end; None: the film is finished."""
         if self.film.is_finished():
             return None
         said = [line for line in self._said("err").splitlines() if line.startswith(signed(""))]
@@ -243,7 +259,7 @@ class BakeJob:
         return (self.log / stream).read_text(encoding="utf-8", errors="replace")
 
     def end(self) -> None:
-        """Stop it if it runs, and remove its temporary files. Finished frames stay."""
+        """Stop the process if it runs, and remove temporary files. Finished frames stay."""
         if not self.is_over():
             self.process.terminate()
         with suppress(OSError):  # Windows keeps open files
@@ -252,7 +268,11 @@ class BakeJob:
 
 
 def start(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film) -> BakeJob:
-    """Begin to bake a film. EffectError, OSError: it cannot begin."""
+    """Begin to bake a film in a second Blender, and return the job.
+
+    Raises:
+        EffectError, OSError: It cannot begin.
+    """
     edit = Path(bpy.data.filepath)
     film.place.parent.mkdir(parents=True, exist_ok=True)
     atomic_write.clear_up(film.place.parent)
@@ -276,7 +296,10 @@ def start(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film) -> Bake
 
 
 def _command(scene: Scene, strip: Strip, film: Film, copy: Path) -> list[str]:
-    """Return the words that bake a film of a copied edit in another process. Names can begin with a dash."""
+    """Return the command line that bakes a film of a copied edit in another process.
+
+    Options have the form --name=value, because names in the edit can begin with a dash.
+    """
     program = [sys.executable, "-m", "shutter_addon"]  # with Blender as a library
     if bpy.app.binary_path:
         package = __package__.rpartition(".shutter_addon")[0]

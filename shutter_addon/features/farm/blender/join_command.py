@@ -1,4 +1,4 @@
-"""The command `join`: a movie of rendered frames, with the edit's sound."""
+"""The command `join`: make a movie of frames that were rendered before, with the edit's sound and settings."""
 
 import re
 from argparse import ArgumentParser, Namespace
@@ -61,10 +61,10 @@ AT_ONCE = 1000  # pictures per strip: Blender copies all of them for each that i
 
 
 def _pictures(folder: Path, frames: range) -> list[Path]:
-    """Return the picture of each frame, a file whose name is its number.
+    """Return the file of each frame in a folder, whose name is the frame's number.
 
     Raises:
-        OutputError: Some are missing, or twice.
+        OutputError: Some are missing, or exist twice.
         OSError: The folder cannot be read.
     """
     pictures: dict[int, Path] = {}
@@ -79,10 +79,15 @@ def _pictures(folder: Path, frames: range) -> list[Path]:
 
 
 def _common(paths: list[Path], looked: Callable, size: tuple[int, int], key: str) -> RenderedPicture:
-    """Return the common properties of all pictures; `looked` is called after each.
+    """Read all pictures, check that they are alike, and return their common size, channels and so on.
+
+    Args:
+        looked: Called after each picture.
+        size: Width and height that they must have.
+        key: Key of the edit's version, which they must carry if they carry any.
 
     Raises:
-        OutputError: A picture is damaged, unlike the first, or of another edit than that of `key`.
+        OutputError: A picture is damaged, unlike the first, or of another edit.
     """
     pool = threads.pool()
     first: RenderedPicture | None = None
@@ -109,9 +114,15 @@ def _described(picture: RenderedPicture) -> str:
 
 
 def _refuse_transparency(scene: Scene, paths: list[Path], first: RenderedPicture) -> None:
-    """Raise OutputError for transparent PNG files that Blender's own film would show in other colours.
+    """Check that no picture is a transparent PNG file that a film rendered by Blender would show in other colors.
 
-    A film applies the view after composing over black, but the files have it applied to their colours.
+    A film applies the view transform after composing over black, but the files have it applied to their colors already.
+
+    Args:
+        first: What all pictures have in common.
+
+    Raises:
+        OutputError: One is.
     """
     is_shown_otherwise = _shown(scene).view_settings.view_transform != "Standard"
     if paths[0].suffix == ".png" and first.channels in (2, 4) and is_shown_otherwise:
@@ -122,13 +133,17 @@ def _refuse_transparency(scene: Scene, paths: list[Path], first: RenderedPicture
 
 
 def _shown(scene: Scene) -> Scene | ImageFormatSettings:
-    """Return the owner of the display and view settings of the edit's output."""
+    """Return the struct that has the display and view settings of the edit's output."""
     settings = scene.render.image_settings
     return settings if settings.color_management == "OVERRIDE" else scene
 
 
 def _cover_edit(scene: Scene, paths: list[Path], first: RenderedPicture) -> None:
-    """Cover everything that the edit shows with the pictures. Sounds stay."""
+    """Add strips with the pictures above all others, so that the edit shows nothing else. Sounds stay.
+
+    Args:
+        first: What all pictures have in common.
+    """
     editor = scene.sequence_editor
     editor.display_stack(None)  # Blender renders the meta strip that was open when the file was saved
     channel = max((strip.channel for strip in editor.strips), default=0) + 1
@@ -149,9 +164,10 @@ def _cover_edit(scene: Scene, paths: list[Path], first: RenderedPicture) -> None
 
 
 def _keep_colours(scene: Scene, suffix: str, first: RenderedPicture) -> str | None:
-    """Make the view leave PNG files unchanged, which are finished, and return their colour space.
+    """Set the view so that it leaves the colors of PNG files unchanged, since their colors are final.
 
-    EXR files are scene-linear: None.
+    Returns:
+        The color space of the files; None for EXR files, which are scene-linear and get the edit's view.
     """
     if suffix == ".exr":
         return None
@@ -168,9 +184,12 @@ def _keep_colours(scene: Scene, suffix: str, first: RenderedPicture) -> str | No
 
 
 def _set_output(scene: Scene, output: Path, size: tuple[int, int]) -> None:
-    """Set the output: the edit's own settings if they are a movie's, else those of the command.
+    """Set the scene's output to a movie, with the edit's own movie settings if it has some, else the command's.
 
-    The container follows the output's suffix. Burnt in metadata, other sizes and other places are turned off.
+    The container follows the path's suffix. Burnt-in metadata, other sizes and other places are turned off.
+
+    Args:
+        size: Width and height of the pictures.
     """
     render = scene.render
     if render.image_settings.media_type == "VIDEO":

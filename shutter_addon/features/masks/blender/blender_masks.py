@@ -1,6 +1,7 @@
-"""Blender's masks: read them as plain data, and make mattes and outlines of them.
+"""Blender's masks: read them as plain data, and make mattes or outlines of them.
 
-Python's API has a mask only at a scene's frame. So a mask that moves is no matte, but can become an outline.
+Python's API evaluates a mask only at a scene's current frame. So a mask that moves cannot be a matte, but can be turned
+into an outline.
 """
 
 from collections.abc import Iterable, Iterator
@@ -28,7 +29,11 @@ _FARTHEST = 1e4  # of coordinates, in pictures
 
 
 def still_mask(mask: Mask) -> masks.MaskShape:
-    """Return a mask that does not move. EffectError: it does, or a number is not usable."""
+    """Return the shape of a mask that does not move, as plain data.
+
+    Raises:
+        EffectError: It moves, or a number is not usable.
+    """
     points = (point for layer in mask.layers for spline in layer.splines for point in spline.points)
     is_keyed = fcurves.curves_under(mask, "") or any(map(_has_shape_keys, mask.layers))
     if is_keyed or any(point.parent.id is not None for point in points):
@@ -38,7 +43,11 @@ def still_mask(mask: Mask) -> masks.MaskShape:
 
 
 def at_frames(mask: Mask, frames: Iterable[int]) -> Iterator[masks.MaskShape]:
-    """Yield a mask at its frames, as Blender evaluates it. EffectError: a number is not usable."""
+    """Yield the shape of a mask at each of these frames, as Blender evaluates it there.
+
+    Raises:
+        EffectError: A number is not usable.
+    """
     scene = bpy.data.scenes.new("mask")
     try:
         for frame in frames:
@@ -49,7 +58,10 @@ def at_frames(mask: Mask, frames: Iterable[int]) -> Iterator[masks.MaskShape]:
 
 
 def _has_shape_keys(layer: MaskLayer) -> bool:
-    """Tell whether a layer has shape keys. The API lacks them; False also where its memory cannot be read."""
+    """Tell whether a mask's layer has shape keys, read from Blender's memory, since the API lacks them.
+
+    False also where its memory cannot be read.
+    """
     with suppress(LayoutError):
         (ends,) = read(record("MaskLayer", ("ListBase splines_shapes", "2u8")), layer.as_pointer())
         return any(ends)
@@ -85,7 +97,11 @@ def _spline(mask: Mask, spline: MaskSpline) -> masks.MaskSpline:
 
 
 def _check(mask: Mask, values: ArrayLike) -> None:
-    """Raise EffectError for a number of a mask that is not finite, or too far away."""
+    """Check that numbers of a mask are finite and not beyond _FARTHEST.
+
+    Raises:
+        EffectError: One is not.
+    """
     if not (np.abs(np.asarray(values, np.float64)) <= _FARTHEST).all():
         sentence = rpt_('mask "{mask}": a point, a feather or an opacity is not a usable number')
         raise EffectError(sentence.format(mask=mask.name))
@@ -135,14 +151,18 @@ def outline_from_mask(self: Operator, _context: Context, effect: PropertyGroup) 
 
 
 def _where_motion_changes(shapes: dict[int, masks.MaskShape]) -> dict[int, masks.MaskShape]:
-    """Return those of a mask's shapes by frame between which it moves evenly."""
+    """Return the shapes at those frames where a mask's motion changes; in between, it moves evenly.
+
+    Args:
+        shapes: The mask's shape at each frame.
+    """
     steps = np.diff(np.array([_numbers(shape) for shape in shapes.values()]), axis=0)
     changes = np.abs(np.diff(steps, axis=0, prepend=1, append=0)).max(axis=1, initial=0)
     return {frame: shape for (frame, shape), change in zip(shapes.items(), changes, strict=True) if change > _EVEN}
 
 
 def _numbers(shape: masks.MaskShape) -> np.ndarray:
-    """Return the numbers of a mask that may move."""
+    """Return all numbers of a mask that may move, in one array: opacities of layers, points and their weights."""
     splines = [spline for layer in shape.layers for spline in layer.splines]
     moving = [np.concatenate([np.ravel(spline.points), spline.weights]) for spline in splines]
     return np.concatenate([[layer.alpha for layer in shape.layers], *moving])

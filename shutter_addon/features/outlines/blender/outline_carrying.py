@@ -1,4 +1,7 @@
-"""Mattes of tracked outlines for previews, made by a background thread. Until they are there, linear ones are shown."""
+"""Make the mattes of tracked outlines that previews lack, on a background thread.
+
+Until they are made, previews show outlines that move straight from drawing to drawing.
+"""
 
 from __future__ import annotations
 
@@ -23,14 +26,17 @@ TICK = 0.25  # seconds between two looks at the thread
 
 @dataclass
 class _Carrying:
-    """The mattes that a thread makes. It touches no bpy.
+    """Mattes that a thread is making. The thread touches no bpy.
 
     Attributes:
-        frames: Source frames to make: drawn ones first, then those nearest to the middle.
-        middle: A source frame; None: the middle of the frames.
-        done: How many are made.
-        told: How many were made when previews were redrawn: when the drawn ones are done, and at the end.
-        soon: How many of the frames are drawn.
+        file: Makes and keeps them.
+        frames: Frames of the footage to make mattes for: drawn ones first, then those nearest to `middle`.
+        middle: A frame of the footage; None: the middle of the frames.
+        done: How many mattes are made.
+        told: How many were made when previews were last redrawn for them.
+        ended: Makes the thread end when it is set.
+        soon: How many of the frames are drawn. Once these are made, previews are redrawn.
+        future: Of the thread's end.
     """
 
     file: CarriedFile
@@ -61,9 +67,9 @@ class _Mattes:
     """The mattes that previews lack.
 
     Attributes:
-        wanted: Source frames, by file.
+        wanted: Frames of the footage that lack one, by file.
         failed: Why mattes of a file could not be made.
-        carrying: Those that are made.
+        carrying: Those that a thread is making now; None: none.
     """
 
     wanted: dict[CarriedFile, set[int]] = field(default_factory=dict)
@@ -75,13 +81,18 @@ _mattes = _Mattes()
 
 
 def want_matte(file: CarriedFile, frame: int) -> None:
-    """Note the source frame of a matte that a preview misses."""
+    """Note that a preview lacks the matte of a frame of the footage."""
     if file not in _mattes.failed:
         _mattes.wanted.setdefault(file, set()).add(frame)
 
 
 def carry(file: CarriedFile, frames: list[int], middle: int | None = None) -> None:
-    """Make the mattes of source frames, from a middle outwards, in place of those being made."""
+    """Begin to make mattes on a thread, in place of those being made.
+
+    Args:
+        frames: Frames of the footage.
+        middle: The frame to begin at; None: the middle one.
+    """
     stop()
     _mattes.failed.pop(file, None)
     _mattes.carrying = _Carrying(file=file, frames=frames, middle=middle)
@@ -89,20 +100,23 @@ def carry(file: CarriedFile, frames: list[int], middle: int | None = None) -> No
 
 
 def failure(file: CarriedFile) -> str | None:
-    """Return why the mattes of a file could not be made, or None."""
+    """Return why the mattes of a file could not be made; None: nothing failed."""
     return _mattes.failed.get(file)
 
 
 def progress() -> tuple[int, int] | None:
-    """Return how many mattes are made, and of how many; None: none are being made."""
+    """Return how many mattes are made so far, and of how many; None: none are being made."""
     carrying = _mattes.carrying
     return (carrying.done, len(carrying.frames)) if carrying else None
 
 
 def note_tracking(say: Callable[[str], None]) -> None:
-    """Make the mattes that were missed since the last call, and add notes on the progress and why some are impossible.
+    """Begin to make the mattes that a preview lacked when it was drawn, and add notes about progress and failure.
 
-    They take the place of those that are not wanted any more. Called on the main thread after a preview was drawn.
+    Mattes that are not wanted any more are given up for them. To be called on the main thread after drawing a preview.
+
+    Args:
+        say: Adds a note to the preview.
     """
     wanted = {file: frames for file, frames in _mattes.wanted.items() if file not in _mattes.failed}
     _mattes.wanted.clear()
@@ -117,7 +131,7 @@ def note_tracking(say: Callable[[str], None]) -> None:
 
 
 def _look() -> float | None:
-    """Show what is made, as a timer."""
+    """Redraw previews when the thread has made mattes, and notice its end. This is a timer of Blender."""
     if (carrying := _mattes.carrying) is None:
         return None
     preview_areas.redraw(bpy.context)
@@ -138,14 +152,14 @@ def _look() -> float | None:
 
 
 def stop() -> None:
-    """Stop making mattes; finished ones stay."""
+    """Stop making mattes. Those that are finished stay."""
     if _mattes.carrying is not None:
         _mattes.carrying.ended.set()
         _mattes.carrying = None
 
 
 def forget_pictures() -> None:
-    """Stop and forget everything, when a file is loaded or the extension is disabled."""
+    """Stop making mattes and forget which are wanted, when a file is loaded or the extension is disabled."""
     stop()
     _mattes.wanted.clear()
     _mattes.failed.clear()

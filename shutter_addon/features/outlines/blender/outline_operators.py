@@ -1,4 +1,4 @@
-"""Operators and the gizmo of outlines and subjects: find, track, correct, and go to where a drawing is needed.
+"""Operators and a gizmo for outlines and subjects: find, track and correct them, and go to where a drawing is needed.
 
 Annotations have no key types in Blender 5.2, so the Dope Sheet shows generated and hand-made drawings the same way.
 """
@@ -40,12 +40,16 @@ _MORE = 1.25  # factor for each turn of the wheel
 
 
 def curves_now(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> outlines.Curves:
-    """Return the curves of an outline at the current frame, in fractions of the picture.
+    """Return the curves of an outline or subject at the current frame, in fractions of the picture.
 
-    They are drawn or tracked, or interpolated linearly where nothing is tracked yet.
+    They are those drawn there, or traced around the tracked matte; where nothing is tracked yet, those of an outline
+    that moves straight from drawing to drawing.
+
+    Args:
+        index: Of the region.
 
     Raises:
-        EffectError, MediaError: there are none.
+        EffectError, MediaError: The effect has no source, or a matte cannot be read.
     """
     frame = scene.frame_current
     if not strips.is_carried(effect.regions[index]):
@@ -61,16 +65,22 @@ def _opened(file: CarriedFile) -> CarriedMattes:
 
 
 def shown_curves(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> outlines.Curves:
-    """Return `curves_now` for drawing code. The result is kept until something changes."""
+    """Return what `curves_now` returns, for drawing code. It is kept until something changes."""
     key = effect.scene.session_uid, strip.name, index, scene.frame_current
     return revision.until_change("outline", key, lambda: curves_now(scene, effect, strip, index))
 
 
 def carried_frames(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> tuple[CarriedFile, dict[int, int]]:
-    """Return the mattes of an outline or subject, and the source frame for each timeline frame of its strip.
+    """Return what makes and keeps the mattes of an outline or subject, and which frames of the footage its strip shows.
+
+    Args:
+        index: Of the region.
+
+    Returns:
+        The CarriedFile, and the frame of the footage, from 0, for each timeline frame of the strip.
 
     Raises:
-        EffectError, MediaError: nothing is tracked.
+        EffectError, MediaError: The outline is not tracked, or the effect has no source.
     """
     frames = range(strip.left_handle, strip.right_handle)
     file, shown = snapshot.carried_outline(scene, effect, strip, index, frames)
@@ -78,12 +88,17 @@ def carried_frames(scene: Scene, effect: PropertyGroup, strip: Strip, index: int
 
 
 def next_needed(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> tuple[int | None, float]:
-    """Return the least confident frame of a tracked outline or subject, the middle one of several, and its confidence.
+    """Return the frame of a tracked outline or subject that most needs a drawing: where tracking is least sure.
 
-    None: no frame needs a drawing, as all have this confidence.
+    Args:
+        index: Of the region.
+
+    Returns:
+        The timeline frame, the middle one of several, and how sure tracking is there, 0 to 1. If no frame needs a
+        drawing, None and how sure all are at least.
 
     Raises:
-        EffectError, MediaError: nothing is tracked.
+        EffectError, MediaError: The outline is not tracked, or the effect has no source.
     """
     file, shown = carried_frames(scene, effect, strip, index)
     is_subject = effect.regions[index].kind == "SUBJECT"
@@ -101,15 +116,19 @@ def next_needed(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -
 
 
 def find_subject(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> bool:
-    """Make a region a subject if the model finds one under the strokes that are nearest to the current frame; an
-    outline becomes one by its drawings, which stay.
+    """Make a region a subject, if the network finds one under the strokes nearest in time to the current frame.
+
+    An outline becomes a subject at once, with its drawings.
+
+    Args:
+        index: Of the region.
 
     Returns:
-        Whether it has found one.
+        Whether a subject was found.
 
     Raises:
         EffectError: There are no strokes.
-        MediaError: There is no picture or no model.
+        MediaError: The footage or the network cannot be read.
     """
     region, before = effect.regions[index], effect.regions[index].kind
     if before == "OUTLINE":
@@ -265,7 +284,10 @@ def subject_outline(self: Operator, _context: Context, effect: PropertyGroup) ->
 
 
 def after_stroke(context: Context, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
-    """Look for a subject under the first stroke of a new effect; the pen draws on the subject from now on."""
+    """After the first stroke of a new effect, look for a subject under it. If there is one, the region becomes it.
+
+    Called when the pen goes up. Further strokes then mark the subject.
+    """
     region = effect.regions[effect.active_region]
     layer = layer_of(effect, region)
     drawn = sum(len(drawing.strokes) for drawing in layer.frames) if layer else 0
@@ -282,7 +304,7 @@ def after_stroke(context: Context, scene: Scene, effect: PropertyGroup, strip: S
 
 
 def draw_new(layout: UILayout) -> None:
-    """Draw the menu's entries for new subjects and outlines."""
+    """Draw the menu entries that start a new subject or a new outline."""
     subject = layout.operator("shutter.draw", text="Draw Subject", icon="OUTLINER_OB_ARMATURE")
     subject.new, subject.kind = True, "SUBJECT"
     outline = layout.operator("shutter.draw", text="Draw Outline", icon="CURVE_BEZCIRCLE")
@@ -290,10 +312,10 @@ def draw_new(layout: UILayout) -> None:
 
 
 class SHUTTER_GT_outline(Dragged, Gizmo):
-    """The curves of the active outline in a preview. Dragging corrects them and makes the frame a drawing."""
+    """The curves of the active outline or subject in a preview. Dragging corrects them and makes them a drawing."""
 
     def seen(self, context: Context) -> tuple[outlines.Curves, View] | None:
-        """Return the curves at the current frame and the view of the picture. There are none during playback."""
+        """Return the curves at the current frame, and where the picture is; None: there are none, or the film plays."""
         seen = None if context.screen.is_animation_playing else selection.in_picture(context)
         if seen is None:
             return None
@@ -329,7 +351,7 @@ class SHUTTER_GT_outline(Dragged, Gizmo):
         return outlines.dragged(self.curves, self.pulled, self.grabbed, self.by, self.reach, self.aspect)
 
     def _there(self) -> tuple[PropertyGroup, Strip] | None:
-        """Return effect and strip of the grabbed outline; None: they are gone."""
+        """Return the effect and the strip of the outline that is dragged; None: they are gone."""
         effect = self.target.effect()
         strip = effect and effect.id_data.sequence_editor.strips_all.get(self.strip)
         return None if strip is None else (effect, strip)

@@ -1,7 +1,7 @@
-"""Repair a rolling shutter: a sensor that reads row by row films each row at another moment.
+"""Repair a rolling shutter: a sensor that reads row by row films each row at another time, so that moving lines lean.
 
 A row that is read a fraction y of the readout after the first one is shown y - 1/2 of the readout earlier. Then all
-rows show the moment of the middle row. Two shutters are open for one frame each, before and after the shown one, and a
+rows show the time of the middle row. Two shutters are open for one frame each, before and after the shown one, and a
 ramp across the picture displaces between them. The ramp is larger than the picture, as a readout is shorter than two
 frames.
 """
@@ -36,12 +36,12 @@ _TURNS = {"TOP": 90, "BOTTOM": -90, "LEFT": 180, "RIGHT": 0}
 
 
 class Repair(NamedTuple):
-    """The repair of an effect.
+    """The rolling shutter repair that an effect contains.
 
     Attributes:
-        region: index of its ramp.
-        readout: from the first to the last row, as a fraction of a filmed frame.
-        side: read first, a key of choices.SIDES.
+        region: Index of its ramp.
+        readout: Time from reading the first row to the last, as a fraction of a frame of the footage.
+        side: The side that is read first, an item of choices.SIDES.
     """
 
     region: int
@@ -50,7 +50,7 @@ class Repair(NamedTuple):
 
 
 def of(effect: PropertyGroup) -> Repair | None:
-    """Return the repair of an effect, whatever its shutters and ramp are named; None: it has none."""
+    """Return the repair of an effect, recognized by its ramp and shutters, whatever their names; None: it has none."""
     if effect.inbetween == "1" or not effect.shutters:
         return None
     default = _moment(effect.shutters[0])
@@ -67,25 +67,26 @@ def of(effect: PropertyGroup) -> Repair | None:
 
 
 def _moment(shutter: PropertyGroup) -> float:
-    """Return the middle of a shutter's open time, in bars from the middle of the first one; NaN: it is never open."""
+    """Return the middle of the time that a shutter is open, in frames from its first one; NaN: it is never open."""
     weights = bars(shutter)
     return float((weights * np.arange(len(weights))).sum() / weights.sum()) if weights.any() else math.nan
 
 
 def _shown(effect: PropertyGroup) -> int:
-    """Return the index of the bar that exposes the shown frame when *Position* is *Center*."""
+    """Return the index of the frame of the shutters' window that is the shown frame, with *Position* at *Center*."""
     return Options(validation.number(effect, "window"), position="center").before
 
 
 def repair(scene: Scene, effect: PropertyGroup, strip: Strip, share: float, side: str) -> None:
-    """Repair the readout of an effect's source, or change its repair.
+    """Add a rolling shutter repair to an effect, or change the one that it has.
 
     Args:
-        share: see Repair.readout.
-        side: see Repair.side.
+        share: Readout time as a fraction of a frame of the footage (Repair.readout).
+        side: The side that is read first, an item of choices.SIDES.
 
     Raises:
-        EffectError, MediaError: it has no room, the footage cannot be read, or OpenCV is missing. Nothing has changed.
+        EffectError, MediaError: The effect has no room, the footage cannot be read, or OpenCV is missing. Nothing has
+            changed.
     """
     frame = scene.frame_current
     if (time := Sampling.of(scene, effect, strip, (frame,)).time) is not None:

@@ -1,8 +1,8 @@
-"""Smooth pictures of previews, which follow plain ones, so that drawing never waits for optical flow.
+"""Make pictures with moments between frames ("smooth") for previews, after plain ones, so that drawing never waits.
 
-A preview first shows the plain exposure of filmed frames. Meanwhile a thread makes the moments between them, and the
-smooth picture is composed in slices of time from those that are ready. Then it replaces the plain one. A moving
-playhead or a new stroke ends this.
+A preview first shows the exposure of the footage's frames alone, the plain picture. Meanwhile a thread makes the
+moments between them by optical flow, and the smooth picture is composed in slices of time from those that are ready.
+Then it replaces the plain one. A moving playhead or a new stroke ends this.
 """
 
 from __future__ import annotations
@@ -26,18 +26,19 @@ _UNSEEN = 5.0  # seconds without a request after which a picture is dropped
 
 @dataclass
 class _Coming:
-    """A smooth picture that is being made.
+    """A picture with moments between frames (smooth) that is being made for a preview.
 
     Attributes:
-        key: Key of the plain picture, and steps_key.
-        asked: What was last asked for: context, snapshot, timeline frame and detail, at the time `since`.
-        steps: Finds the steps.
-        is_asked: Whether it was asked for since the last look.
+        key: Key of the picture without moments (plain), and effect_source.steps_key.
+        asked: What was last asked for: context, snapshot, timeline frame and detail.
+        steps: Finds on a thread how many moments there are from frame to frame; None: not begun.
+        since: When it was last asked for (time.monotonic).
+        is_asked: Whether it was asked for since advance_smooth was last called.
         is_seen: Whether the plain picture was drawn.
         is_over: Whether nothing is left to do.
         is_alone: Whether the device has no room for both pictures.
-        made: Key of the composed request.
-        fault: Why there is no picture.
+        made: Key of the composed request; None: not composed.
+        fault: Why there is no picture; None: no error.
         slices: Slices of time in which it is composed.
     """
 
@@ -54,7 +55,11 @@ class _Coming:
     slices: Slices = field(default_factory=Slices)
 
     def request(self) -> Request | None:
-        """Return the smooth request; None: its steps or its renderer are missing."""
+        """Return the request for the picture with moments between frames, if that can be made without waiting.
+
+        Returns:
+            None if it is not known yet how many moments there are, or if its renderer is not open.
+        """
         render, snapshot, frame, detail = self.asked
         if known_steps(snapshot) is None or render.session.open_renderer(SourceKey.of(snapshot, detail)) is None:
             return None
@@ -65,16 +70,20 @@ class _Coming:
         return render.request(snapshot, frame, replace(detail, smooth=False))
 
     def lacks(self, request: Request) -> bool:
-        """Tell whether frames have to be read for a picture."""
+        """Tell whether frames have to be read before a picture can be made."""
         return bool(self.asked[0].renderer(request).missing(request))
 
     def rest(self) -> None:
-        """Stop the thread's work."""
+        """Have the thread stop computing the moments between frames."""
         if (request := self.request()) is not None:
             self.asked[0].renderer(request).source.want(())
 
     def advance(self, seconds: float) -> float:
-        """Compose the picture for some seconds. Return in how many seconds to go on."""
+        """Do a part of the work: find how many moments there are, or compose the picture for some seconds.
+
+        Returns:
+            In how many seconds to redraw and go on.
+        """
         render, snapshot, frame, detail = self.asked
         if not self.is_seen:
             self.is_seen = True
@@ -103,10 +112,12 @@ _coming: dict[int, _Coming] = {}  # by effect scene
 
 
 def smooth_request(render: RenderContext, snapshot: Snapshot, frame: float, detail: Detail) -> tuple[Request, bool]:
-    """Return the smooth request if its picture is ready, else the plain one and whether the smooth one follows.
+    """Return the request for the picture with moments between frames if that is ready, else for the one without.
+
+    Begin to make the one with moments, if the effect wants it. The second value tells whether it follows.
 
     Raises:
-        effect_source.FAULTS: There is no picture.
+        effect_source.FAULTS: The effect cannot be shown.
     """
     steps, before = known_steps(snapshot), _coming.get(snapshot.scene)
     plain = render.request(snapshot, frame, replace(detail, smooth=False))
@@ -130,10 +141,10 @@ def smooth_request(render: RenderContext, snapshot: Snapshot, frame: float, deta
 
 
 def advance_smooth(seconds: float) -> None:
-    """Compose the smooth pictures whose plain ones were drawn, for some seconds each.
+    """Go on making pictures with moments between frames, for some seconds each, once the ones without were drawn.
 
     Raises:
-        effect_source.FAULTS: There is no picture.
+        effect_source.FAULTS: One cannot be made.
     """
     for scene, coming in list(_coming.items()):
         if time.monotonic() > coming.since + _UNSEEN:
@@ -154,12 +165,12 @@ def advance_smooth(seconds: float) -> None:
 
 
 def rest_smooth() -> None:
-    """Stop making smooth pictures."""
+    """Stop making pictures with moments between frames, because the playhead moves or the user draws."""
     while _coming:
         _coming.popitem()[1].rest()
 
 
 def forget_pictures() -> None:
-    """Wait for threads, and forget everything: when a file is loaded or the extension is disabled."""
+    """Wait for threads and forget all pictures in work, when a file is loaded or the extension is disabled."""
     wait([coming.steps for coming in _coming.values() if coming.steps is not None])
     _coming.clear()

@@ -1,4 +1,4 @@
-"""Whether an exposure of filmed frames has too few of them for a smooth streak.
+"""Find out whether an exposure has too few frames, so that what moves shows as copies instead of a streak (strobing).
 
 That depends on how far the picture moves between the exposed frames next to the shown one. A thread that touches no bpy
 measures this when the interface calls `advance`; drawing only asks for what is known, and never waits.
@@ -43,13 +43,14 @@ _NEVER = None, None, False
 
 @dataclass
 class _Measuring:
-    """What is measured.
+    """What is measured, and what is known.
 
     Attributes:
-        moved: By a source's key and the first frame of a pair.
-        looks: By scene: the timeline frame of the last look, the step it found, and whether the source repeats frames.
-        wanted: What is to be measured next, a source and the first frame of a pair.
-        job: What is measured now.
+        moved: Motion by the source's key and the first frame of a pair of neighbors; None: it cannot be found.
+        looks: By session_uid of the effect scene, what the last call of `look` found: the timeline frame, the step in
+            pixels, and whether the source repeats frames.
+        wanted: What to measure next: a source, and the first frame of a pair; None: nothing.
+        job: The measurement that is running; None: none.
     """
 
     moved: RecentValues[tuple, smooth.Moved | None] = field(default_factory=RecentValues)
@@ -62,9 +63,11 @@ _measuring = _Measuring()
 
 
 def look(effect: PropertyGroup, snapshot: Snapshot, renderer: Renderer, request: Request) -> tuple[float | None, bool]:
-    """Return the step from frame to frame in pixels of the footage, and whether it differs from the last look.
+    """Find out from what is known how far the picture moves between exposed frames. What is unknown is measured later.
 
-    None: it is smooth, or not known yet; then it is measured.
+    Returns:
+        The step from frame to frame in pixels of the footage; None: it is small enough for a streak, or not known yet.
+        And whether anything differs from the result of the last call.
     """
     _measuring.wanted, before = None, (last(effect), repeats(effect))
     frame, known = effect.id_data.frame_current, _step(effect, snapshot, renderer, request)
@@ -73,13 +76,13 @@ def look(effect: PropertyGroup, snapshot: Snapshot, renderer: Renderer, request:
 
 
 def last(effect: PropertyGroup) -> float | None:
-    """Return the step that the last look found, if it was at the current frame."""
+    """Return the step in pixels that `look` found last, if that was at the current frame, else None."""
     frame, known, _repeats = _measuring.looks.get(effect.scene.session_uid, _NEVER)
     return known if frame == effect.id_data.frame_current else None
 
 
 def repeats(effect: PropertyGroup) -> bool:
-    """Tell whether the last look found that the source repeats frames."""
+    """Tell whether `look` found last that the source repeats frames."""
     return _measuring.looks.get(effect.scene.session_uid, _NEVER)[-1]
 
 
@@ -102,7 +105,10 @@ def _step(effect: PropertyGroup, snapshot: Snapshot, renderer: Renderer, request
 
 
 def _exposed_pairs(renderer: Renderer, request: Request) -> dict[int, set[int]]:
-    """Return the first frames of neighbors that each visible shutter exposes without closing in between."""
+    """Return, by index of each visible shutter, the pairs of neighboring frames between which it does not close.
+
+    A pair is given by its first frame.
+    """
     state, pairs = request.state, {}
     shot = renderer.shot(request, known=True)
     frames = windows.indices(state.options, request.index, shot, request.direction)
@@ -116,7 +122,7 @@ def _exposed_pairs(renderer: Renderer, request: Request) -> dict[int, set[int]]:
 
 
 def _visible(state: FrameState) -> set[int]:
-    """Return the shutters that expose pixels."""
+    """Return the indices of the shutters that expose any pixel."""
     drawn = {shape.shutter for shape in state.shapes if len(shape.strokes)}
     if state.options.border or not drawn:
         drawn.add(0)
@@ -124,7 +130,13 @@ def _visible(state: FrameState) -> set[int]:
 
 
 def _ways(state: FrameState, shutter: int, pair: int, height: int) -> tuple[Similarity, Similarity]:
-    """Return where points of the shown picture lie in two frames, in heights of the picture."""
+    """Return where points of the shown picture lie in the two frames of a pair, by what a shutter's exposure follows.
+
+    Args:
+        shutter: Index of the shutter.
+        pair: The first frame.
+        height: Of the pictures in which motions count pixels. The result counts heights of the picture.
+    """
     if state.following is None:
         return Similarity(), Similarity()
     turns, shifts = state.following.at([pair, pair + 1])
@@ -133,12 +145,12 @@ def _ways(state: FrameState, shutter: int, pair: int, height: int) -> tuple[Simi
 
 
 def is_busy() -> bool:
-    """Tell whether something is measured, or about to be."""
+    """Tell whether something is being measured, or about to be."""
     return _measuring.job is not None or _measuring.wanted is not None
 
 
 def advance() -> bool:
-    """Start the next measurement, if none runs. Return whether one has finished."""
+    """Start the next measurement on a thread, if none is running. Return whether one has just finished."""
     if _measuring.job is not None and not _measuring.job.done():
         return False
     ended, _measuring.job = _measuring.job is not None, None
@@ -150,7 +162,11 @@ def advance() -> bool:
 def note_streaks(
     effect: PropertyGroup, snapshot: Snapshot, renderer: Renderer, request: Request, say: Callable[[str], None]
 ) -> None:
-    """Add a note to a preview if too few frames are exposed."""
+    """Add a note to a preview if the exposure has too few frames. Measure what is not known, once the frame stays.
+
+    Args:
+        say: Adds a note.
+    """
     known, is_new = look(effect, snapshot, renderer, request)
     if known is not None:
         say(too_few_frames(known))
@@ -162,17 +178,17 @@ def note_streaks(
 
 
 def _measure() -> float | None:
-    """Measure motion, a little at a time."""
+    """Start measurements, and redraw previews when one has finished. This is a timer of Blender."""
     if advance():
         preview_areas.redraw()
     return _TICK if is_busy() else None
 
 
 def too_few_frames(step: float) -> str:
-    """Return a note about an exposure that shows copies.
+    """Return a note for the user that an exposure shows copies instead of a streak.
 
     Args:
-        step: pixels from one exposed frame to the next.
+        step: Pixels that the picture moves from one exposed frame to the next.
     """
     return rpt_("Too few frames: steps of {pixels} pixels").format(pixels=f"{step:.0f}")
 
@@ -204,7 +220,7 @@ def smooth_streaks(_self: Operator, _context: Context, effect: PropertyGroup) ->
 
 
 def draw_smooth(layout: UILayout, effect: PropertyGroup) -> None:
-    """Draw how smooth an effect is."""
+    """Draw the settings of *Smooth* in a panel."""
     row = layout.row(align=True)
     row.prop(effect, "inbetween")
     if effect.inbetween != "1":
@@ -214,6 +230,6 @@ def draw_smooth(layout: UILayout, effect: PropertyGroup) -> None:
 
 
 def notes(effect: PropertyGroup) -> Iterator[tuple[str, str]]:
-    """Yield notes on an effect, each with the operator that helps."""
+    """Yield notes about an effect for the panel, each with the bl_idname of the operator that helps."""
     if (step := last(effect)) is not None:
         yield too_few_frames(step), "shutter.smooth_streaks"

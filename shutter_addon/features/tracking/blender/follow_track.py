@@ -1,4 +1,4 @@
-"""Key a region by what Blender has tracked in a movie clip: a track, a plane track, or all tracks of an object.
+"""Move a region by what Blender has tracked in a movie clip: a track, a plane track, or all tracks of an object.
 
 Markers are at frames of the clip, which begin at 1, in fractions of its picture. The region moves with them from the
 current frame and from the user's other keyframes.
@@ -27,12 +27,15 @@ Point = tuple[str, np.ndarray, np.ndarray]  # see _markers
 
 
 def follow(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> None:
-    """Key a region by its track, from its place at the current frame and at the user's other keyframes.
+    """Insert keyframes that move a region with its track, from its place at the current frame and the user's keyframes.
 
-    Its tracking stops are removed.
+    Where tracking of the region had stopped is forgotten.
+
+    Args:
+        index: Of the region.
 
     Raises:
-        EffectError, MediaError: it cannot be followed. Nothing has changed.
+        EffectError, MediaError: It cannot follow the track. Nothing has changed.
     """
     start, region = scene.frame_current, effect.regions[index]
     points = _points(scene, effect, strip, index, start)
@@ -49,18 +52,19 @@ def follow(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> Non
 
 
 def holder_of(region: PropertyGroup) -> MovieTrackingObject | None:
-    """Return the object with the tracks of a region's clip; None: it has no such object."""
+    """Return the tracking object of a region's clip whose tracks can be chosen; None: the clip has no such object."""
     objects = region.follow_clip.tracking.objects
     return objects.get(region.follow_object) if region.follow_object else objects[0]
 
 
 def _markers(region: PropertyGroup) -> list[Point]:
-    """Return name, frames (n,) and places (n, 2) of each point that a region follows.
+    """Return each point that a region follows: its name, and the places of its markers.
 
-    Frames are the clip's, ascending, and places are fractions of the picture.
+    Returns:
+        Name, the clip's frames (n,), ascending, and places (n, 2) in fractions of the picture.
 
     Raises:
-        EffectError: the clip has no such track.
+        EffectError: No clip is chosen, or it has no such track.
     """
     clip = region.follow_clip
     if clip is None:
@@ -90,16 +94,20 @@ def _corners(plane: bpy.types.MovieTrackingPlaneTrack) -> list[Point]:
 
 
 def _shown(name: str, markers: bpy.types.bpy_prop_collection, places: np.ndarray) -> Point:
-    """Return a point without its muted markers."""
+    """Return a point as in _markers, without its muted markers."""
     is_shown = ~fcurves.numbers(markers, "mute", bool)
     return name, fcurves.numbers(markers, "frame", np.int32)[is_shown], places[is_shown]
 
 
 def _points(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, start: int) -> dict[int, Points]:
-    """Return the points that a region follows, by timeline frame of the strip.
+    """Return the points that a region follows, in pixels, at each timeline frame of the strip.
+
+    Args:
+        index: Of the region.
+        start: Timeline frame from which the region will move.
 
     Raises:
-        EffectError, MediaError: there are none at the frame `start`.
+        EffectError, MediaError: There are none at `start`, or the region cannot be keyed or has no strokes.
     """
     region = effect.regions[index]
     validation.check_moving(region)
@@ -123,10 +131,10 @@ def _points(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, start
 
 
 def _clip_times(scene: Scene, effect: PropertyGroup, strip: Strip, clip: MovieClip) -> dict[int, float]:
-    """Return the clip's frame for each timeline frame of the strip. It may lie between two frames.
+    """Return the clip's frame at each timeline frame of the strip. It may lie between two frames.
 
     Raises:
-        EffectError, MediaError: the strip does not show the clip's footage.
+        EffectError, MediaError: The strip does not show the clip's footage.
     """
     frames = range(strip.left_handle, strip.right_handle)
     source = strips.source_of(scene, effect, strip)
@@ -140,11 +148,11 @@ def _clip_times(scene: Scene, effect: PropertyGroup, strip: Strip, clip: MovieCl
 
 
 def _check_footage(source: Strip, clip: MovieClip) -> None:
-    """Check that a clip and a strip begin with the same file.
+    """Check that a clip and a source strip begin with the same file.
 
     Raises:
-        EffectError: they do not.
-        MediaError: the strip has no files.
+        EffectError: They do not.
+        MediaError: The strip has no files.
     """
     own = source.clip if source.type == "MOVIECLIP" else None
     first = external_files.absolute(own, own.filepath) if own else source_media.spec(source).path
@@ -154,7 +162,13 @@ def _check_footage(source: Strip, clip: MovieClip) -> None:
 
 
 def _place_at(frames: np.ndarray, places: np.ndarray, time: float) -> np.ndarray | None:
-    """Return the place of a marker at a time in clip frames, interpolated between two frames."""
+    """Return the place of a marker at a clip's frame, interpolated between two; None: it has no marker there.
+
+    Args:
+        frames: Frames of its markers (n,).
+        places: Their places (n, 2).
+        time: Frame of the clip, maybe between two.
+    """
     ends = [np.flatnonzero(frames == end) for end in (np.floor(time), np.ceil(time))]
     if not all(map(len, ends)):
         return None
@@ -165,18 +179,26 @@ def _place_at(frames: np.ndarray, places: np.ndarray, time: float) -> np.ndarray
 def _followed(
     subject: Region, frames: list[int], moves: dict[int, Motions], start: int, size: tuple[int, int]
 ) -> dict[int, Placement]:
-    """Return the placement of a region by frame, moved from the frames where it is known.
+    """Return where a region is at each frame, moved along from the frames where its place is known.
+
+    Between two of these, motion from both is blended.
 
     Args:
-        frames: ascending.
-        moves: motions of the picture to other frames, by frame with a known placement, including `start`.
+        frames: Timeline frames, ascending.
+        moves: For each frame with a known place, `start` included, the picture's motion from there to other frames.
+        start: Timeline frame from which the region is followed both ways.
+        size: Width and height of the picture in pixels.
     """
     known, placed = sorted(moves), ((frame, subject.centre(frame)) for frame in frames)
     centres = {frame: centre for frame, centre in placed if centre is not None}
     result = {start: subject.placement(start)}
 
     def carried(origin: int, frame: int, near: Placement) -> Placement | None:
-        """Return the placement at a frame, with its rotation near another one's; None: there are too few points."""
+        """Return where the region is at a frame, moved along from the frame `origin`; None: there are too few points.
+
+        Args:
+            near: Its place at a neighboring frame, from which rotation goes on without a jump by whole turns.
+        """
         if (motion := moves[origin].get(frame)) is None:
             return None
         moved = motions.carried(subject.placement(origin), motion, centres[origin], centres[frame], size)
@@ -202,7 +224,10 @@ def _ways(frames: list[int], start: int) -> tuple[list[int], list[int]]:
 
 
 def _motions(points: dict[int, Points], origin: int) -> Motions:
-    """Return the motion from one frame to each frame. With too few common points it goes through the previous frame."""
+    """Return the picture's motion from one frame to each frame, by the points that both have.
+
+    With too few common points, it goes through the frame before.
+    """
     by_frame = {origin: Similarity()}
     enough = min(2, len(points[origin]))
     for way in _ways(sorted(points), origin):

@@ -1,4 +1,4 @@
-"""The command `track`: keys for a region of a recipe, which follows what it covers, or for the camera.
+"""The command `track`: track a region of a recipe, or the camera, through footage, and write a recipe with the keys.
 
 It makes an edit, tracks there as *Track* does in the window, and exports the effect.
 """
@@ -104,14 +104,14 @@ def _curves(keys: MotionKeys) -> Iterator[FCurve]:
 
 
 def _offer_keys(keys: MotionKeys, frames: range) -> None:
-    """Let tracking replace the keys of a motion at some frames: they count as its own."""
+    """Let tracking replace the keys of a motion at some frames, by marking them as made by tracking."""
     for key in (key for curve in _curves(keys) for key in curve.keyframe_points):
         if frames[0] <= key.co[0] <= frames[-1]:
             key.type, key.back = motion_keys.MADE, key.co[1]
 
 
 def _drop_keys_between(keys: MotionKeys, tracked: set[int]) -> None:
-    """Remove the keys of a motion between tracked frames."""
+    """Remove the keys of a motion between tracked frames, where tracking needs none."""
     for curve in _curves(keys):
         for key in list(curve.keyframe_points)[::-1]:
             if min(tracked) < key.co[0] < max(tracked) and key.co[0] not in tracked:
@@ -120,7 +120,7 @@ def _drop_keys_between(keys: MotionKeys, tracked: set[int]) -> None:
 
 
 def _write(arguments: Namespace, result: Effect, report: dict[str, Any]) -> None:
-    """Write the recipe and the report, both or neither."""
+    """Write the recipe to --output and the report to --report, both or neither."""
     for path in filter(None, (arguments.output, arguments.report)):
         film_output.make_folder(path.parent)
     with atomic_write.writing(arguments.output) as part:

@@ -1,4 +1,4 @@
-"""Operators and panels that key and track the region or the camera, and use tracks for layers and exposures."""
+"""Operators and panels that track a region or the camera, and that use tracked motion for layers and exposures."""
 
 import math
 import time
@@ -40,7 +40,14 @@ _DIRECTION = given(
 
 
 class _Tracks(Beside):
-    """An operator that tracks the active region or the camera from the current frame in a `direction` of DIRECTIONS."""
+    """A base of operators that track the active region or the camera from the current frame, step by step.
+
+    Subclasses have `direction`, an item of DIRECTIONS.
+
+    Attributes:
+        is_camera: Whether the camera is tracked.
+        once: Whether what is tracked already is not tracked again.
+    """
 
     bl_options = {"UNDO"}
     only_seen = True
@@ -50,14 +57,14 @@ class _Tracks(Beside):
     once = False  # not again what is tracked already
 
     def ended(self, context: Context) -> None:
-        """Do the work after tracking. Esc skips it.
+        """Do what a subclass does after tracking. Not called after Esc.
 
         Raises:
-            EffectError: it is impossible.
+            EffectError: It is impossible.
         """
 
     def begin(self, context: Context, waits: bool) -> set[str] | None:
-        """Track for a moment, and then in steps."""
+        """Begin to track: for a moment, after which Blender calls goes_on, or to the end if `waits`."""
         scene, effect, strip = selection.active(context)
         index = None if self.is_camera else effect.active_region
         moving = selection.moving(effect, index)
@@ -101,10 +108,10 @@ class _Tracks(Beside):
         super().leave(context)
 
     def _track(self, seconds: float) -> bool:
-        """Track for some seconds. Return whether frames remain.
+        """Track for some seconds. Return whether frames are left to track.
 
         Raises:
-            FAULTS: nothing can be tracked.
+            FAULTS: Nothing can be tracked.
         """
         end = time.perf_counter() + seconds
         try:
@@ -200,7 +207,15 @@ _FRAME = given(IntProperty, "Frame", "Timeline frame; without one, the least con
 
 
 def _look(looking: Operator, effect: PropertyGroup, index: int | None) -> set[str] | None:
-    """Go to a frame with low tracking confidence. The index is that of selection.moving."""
+    """Go to the given frame, or to the next one where tracking is unsure.
+
+    Args:
+        looking: The operator, with the property `frame`.
+        index: Of the region; None: the camera.
+
+    Returns:
+        {"CANCELLED"} if there is none, else None.
+    """
     frame: int | None = looking.frame
     is_given = looking.properties.is_property_set("frame")
     if index is not None and effect.regions[index].kind == "SUBJECT" and not is_given:
@@ -241,7 +256,12 @@ _SETTINGS = "motion", "track_until", "track_all_keys", "track_ends"  # of tracki
 
 
 def draw_tracking(layout: UILayout, index: int | None, is_subject: bool = False) -> None:
-    """Draw the buttons that track a region or the camera (selection.moving)."""
+    """Draw the buttons that track a region or the camera, and go to unsure frames.
+
+    Args:
+        index: Of the region; None: the camera.
+        is_subject: Whether the region is a subject, which has another operator for unsure frames.
+    """
     row = layout.row(align=True)
     track = "shutter.track_camera" if index is None else "shutter.track"
     for direction, _name, _description, icon, _number in DIRECTIONS:
@@ -253,7 +273,7 @@ def draw_tracking(layout: UILayout, index: int | None, is_subject: bool = False)
 
 
 def tracking_icon(effect: PropertyGroup, index: int | None) -> str | None:
-    """Return the icon of what `draw_tracked` draws; None: it draws nothing."""
+    """Return the icon of what `draw_tracked` says of a region, or the camera for None: "ERROR", "INFO" or None."""
     faults = track_region.faults(effect, index)
     if any(is_fault for _, _, is_fault in faults):
         return "ERROR"
@@ -262,7 +282,11 @@ def tracking_icon(effect: PropertyGroup, index: int | None) -> str | None:
 
 
 def draw_tracked(layout: UILayout, effect: PropertyGroup, index: int | None) -> None:
-    """Draw the tracking confidence at the current frame, and where tracking stopped or lost the subject."""
+    """Draw how sure tracking is at the current frame, and where it stopped or lost the subject.
+
+    Args:
+        index: Of the region; None: the camera.
+    """
     look = "shutter.track_camera_look" if index is None else "shutter.track_look"
     confidence = track_region.confidence_at(effect, index, effect.id_data.frame_current)
     if confidence is not None:

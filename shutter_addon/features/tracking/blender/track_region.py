@@ -1,7 +1,7 @@
-"""Track a region or the camera through its strip, from its place at the current frame.
+"""Track a region or the camera through its strip in Blender, and key it; make shutters follow what was tracked.
 
-An index tells what is tracked (see selection.moving). Each tracked frame gets a keyframe, so that the preview shows it.
-At the end, only keyframes that the motion needs within a pixel remain.
+Functions take an index: that of a region, or None for the camera. Each tracked frame gets a keyframe, so that the
+preview shows it. At the end, only keyframes that the motion needs within a pixel remain.
 """
 
 import math
@@ -35,14 +35,14 @@ from ..tracking import Tracked
 
 
 def frames_to_track(scene: Scene, strip: Strip, direction: str, until: int = 0) -> range:
-    """Return the timeline frames to track from the current one, up to the ends of the strip or the frame `until`.
+    """Return the timeline frames to track, from the current one in a direction, up to the strip's ends or to `until`.
 
     Args:
-        direction: FORWARD, BACKWARD or BOTH.
-        until: 0, or a frame that does not lie in this direction: the end of the strip.
+        direction: "FORWARD", "BACKWARD" or "BOTH".
+        until: Timeline frame; 0, or one in another direction: the end of the strip.
 
     Raises:
-        EffectError: the current frame is outside of the strip.
+        EffectError: The current frame is outside of the strip.
     """
     current, first, last = scene.frame_current, strip.left_handle, strip.right_handle - 1
     if not first <= current <= last:
@@ -57,16 +57,20 @@ def frames_to_track(scene: Scene, strip: Strip, direction: str, until: int = 0) 
 def track(
     scene: Scene, effect: PropertyGroup, strip: Strip, index: int | None, frames: range, patience: float | None = None
 ) -> Generator[int | None, None, None]:
-    """Track a region or the camera from the current frame through timeline frames (frames_to_track).
+    """Track a region or the camera from the current frame, and key each frame.
 
-    Yield each frame after it is keyed. Closing the generator early keeps the tracked frames. It ends if the region is
-    gone.
+    Closing the generator early keeps the tracked frames. It ends if the region is gone.
 
     Args:
-        patience: seconds after which None is yielded while no frame is ready; None: wait.
+        index: Of the region; None: the camera.
+        frames: Timeline frames, from frames_to_track.
+        patience: Seconds after which None is yielded while no frame is ready; None: wait.
+
+    Yields:
+        Each timeline frame after it is keyed.
 
     Raises:
-        EffectError, MediaError: it cannot be tracked. If no frame has been yielded, nothing has changed.
+        EffectError, MediaError: It cannot be tracked. If no frame has been yielded, nothing has changed.
     """
     moving = selection.moving(effect, index)
     validation.check_moving(moving)
@@ -115,21 +119,24 @@ def track(
 
 
 def stops(effect: PropertyGroup, index: int | None) -> list[tuple[int, str, bool]]:
-    """Return where tracking stopped: timeline frame, reason in the user's language, and whether it is a fault.
+    """Return where tracking stopped, ascending: timeline frame, reason for the user, and whether it is a fault.
 
-    The end of a shot is no fault. Frames are ascending.
+    A cut in the footage is no fault.
     """
     return sorted((frame, rpt_(stop.fault), stop.fault != tracking.SHOT_ENDS) for frame, stop in _stops(effect, index))
 
 
 def _stops(effect: PropertyGroup, index: int | None) -> list[tuple[int, PropertyGroup]]:
-    """Return the stops of tracking with their timeline frames."""
+    """Return the stored stops of tracking (data.properties.TrackStop), each with its timeline frame."""
     known = [(effect.start + stop.frame, stop) for stop in selection.moving(effect, index).stops]
     return [(round(frame), stop) for frame, stop in known if math.isfinite(frame)]
 
 
 def key_ends(effect: PropertyGroup, index: int | None) -> None:
-    """Key the influence where the track ends, or remove such keyframes. An outline needs none."""
+    """Insert keyframes that fade a region or the camera's influence out where its track ends, or remove such keyframes.
+
+    A region that is a matte, such as an outline, gets none.
+    """
     keys, fades = MotionKeys(effect, index, "SCALE"), []
     frames, confidence = keys.confidence()
     seen = np.round(frames[confidence > 0]).astype(int).tolist()
@@ -147,13 +154,13 @@ def key_ends(effect: PropertyGroup, index: int | None) -> None:
 
 
 def confidence_at(effect: PropertyGroup, index: int | None, frame: float) -> float | None:
-    """Return the tracking confidence at a timeline frame, 0 to 1; None: it was not tracked."""
+    """Return how sure tracking was at a timeline frame, 0 to 1; None: it was not tracked."""
     frames, confidence = MotionKeys(effect, index, "LOCATION").confidence()
     return next(iter(confidence[frames == frame].tolist()), None)
 
 
 def next_unsure(effect: PropertyGroup, index: int | None, frame: float) -> int | None:
-    """Return the least confident frame of the next stretch of unsure frames, or None."""
+    """Return the least sure timeline frame of the next unsure stretch of tracking after a frame; None: none is left."""
     frames, confidence = MotionKeys(effect, index, "LOCATION").confidence()
     unsure = (frames <= limits.MAX_FRAME) & (confidence < tracking.SURE)
     begins = np.flatnonzero(unsure & ~np.append(False, unsure[:-1]) & (frames > frame))
@@ -164,13 +171,13 @@ def next_unsure(effect: PropertyGroup, index: int | None, frame: float) -> int |
 
 
 def faults(effect: PropertyGroup, index: int | None) -> list[tuple[int, str, bool]]:
-    """Return where tracking lost the subject, if it did, and its stops, like `stops`."""
+    """Return where tracking lost the subject, if it did, and where it stopped: frame, reason, whether a fault."""
     where = lost(effect, index)
     return [*([(*where, True)] if where else []), *stops(effect, index)]
 
 
 def lost(effect: PropertyGroup, index: int | None) -> tuple[int, str] | None:
-    """Return the timeline frame where tracking lost the subject, and a note in the user's language, or None."""
+    """Return the timeline frame where tracking lost the subject, and a note for the user; None: it did not."""
     frame = tracking.lost(*MotionKeys(effect, index, "LOCATION").confidence())
     if frame is None:
         return None
@@ -187,7 +194,14 @@ def lost(effect: PropertyGroup, index: int | None) -> tuple[int, str] | None:
 def _subject(
     scene: Scene, effect: PropertyGroup, strip: Strip, index: int | None, frames: Sequence[int], here: Tracked
 ) -> tuple[Region | Camera, Callable]:
-    """Return a region or the camera as plain data, and the function that follows it, like tracking.Track.follow."""
+    """Return what is tracked as plain data, and the function that tracks it.
+
+    Args:
+        here: Its place at the frame where tracking starts.
+
+    Returns:
+        The region or camera, and a function with the arguments of tracking.Track.follow.
+    """
     if index is None:
         camera = _standing(snapshot.camera_at(scene, effect, frames), here)
         drawn = [i for i, region in enumerate(effect.regions) if region.kind not in strips.MATTES]
@@ -204,7 +218,12 @@ def _subject(
 
 
 def _standing(moving: Any, here: Tracked) -> Any:
-    """Return a region or the camera with the place that the user has set, keyed or not."""
+    """Return a region or the camera as plain data, with the place that the user has set at one frame, keyed or not.
+
+    Args:
+        moving: The region or camera.
+        here: The frame and the place.
+    """
     sampled = {
         name: replace(channel, values=channel.values | {here.frame: getattr(here.placement, name)})
         for name, channel in vars(moving.moves).items()
@@ -214,7 +233,11 @@ def _standing(moving: Any, here: Tracked) -> Any:
 
 
 def _followed(found: Iterator[Tracked], patience: float | None) -> Iterator[Tracked | None]:
-    """Yield what tracking finds on a thread (threads.beside), with errors in the user's language."""
+    """Yield what tracking finds, while it runs on a thread. Its errors are raised in the user's language.
+
+    Args:
+        patience: As in `track`.
+    """
     with translated(rpt_):
         try:
             with closing(threads.beside(found, patience)) as steps:
@@ -230,10 +253,12 @@ def _write(keys: MotionKeys, kept: Iterable[Tracked], tracked: Iterable[Tracked]
 def _mark(
     effect: PropertyGroup, index: int | None, tracked: dict[int, Tracked], stops: list[Tracked], reach: tuple[int, int]
 ) -> None:
-    """Note where tracking stopped, and remove older stops of the frames that it passed or was to reach.
+    """Store where tracking stopped, and remove older stops of the frames that it has passed or was to reach.
 
     Args:
-        reach: first and last frame to track.
+        tracked: What was found, by frame; the first is where tracking started.
+        stops: Where and why it stopped.
+        reach: First and last frame that it was to track.
     """
     moving, start = selection.moving(effect, index), next(iter(tracked))
     ways = {stop.frame > start for stop in stops}
@@ -250,13 +275,15 @@ SMOOTHNESS = 6  # frames before and after each: half a second
 
 
 def make_follow(effect: PropertyGroup, index: int, subject: str, key: bool) -> None:
-    """Make a shutter follow its region ("REGION") or the camera ("CAMERA"), fully open around the frame.
+    """Make a shutter's exposure follow its region or the camera, fully open around the shown frame.
 
     Args:
-        key: insert keyframes for its bars.
+        index: Of the shutter.
+        subject: "REGION" or "CAMERA".
+        key: Insert keyframes for its bars.
 
     Raises:
-        EffectError: the window has no length. Nothing has changed.
+        EffectError: The window's length is out of range. Nothing has changed.
     """
     apply_preset(effect, index, "ANGLE_360", key)
     shutter = effect.shutters[index]
@@ -265,10 +292,11 @@ def make_follow(effect: PropertyGroup, index: int, subject: str, key: bool) -> N
 
 
 def panning_shot(effect: PropertyGroup, index: int, key: bool = False) -> None:
-    """Make a region a sharp layer, and make the other exposure move with it, like a panning camera.
+    """Make a region a sharp layer, and let the exposure of all else move with it, as with a panning camera.
 
     Args:
-        key: insert keyframes for the bars.
+        index: Of the region.
+        key: Insert keyframes for the bars.
     """
     as_layer(effect, index, "STILL", "ANGLE_360", key)
     region = effect.regions[index]
@@ -281,9 +309,12 @@ def panning_shot(effect: PropertyGroup, index: int, key: bool = False) -> None:
 
 
 def is_tracked(scene: Scene, effect: PropertyGroup, strip: Strip, index: int | None) -> bool:
-    """Return whether a region or the camera has a motion that reaches the current frame, which may be in another shot.
+    """Tell whether a region or the camera has keyframes of motion that reach the current frame.
 
     Otherwise *Panning Shot* and *Stabilize Exposure* track it first.
+
+    Args:
+        index: Of the region; None: the camera.
     """
     frame = scene.frame_current
     has_motion = MotionKeys(effect, index, "SCALE").reach(frame)
@@ -291,15 +322,16 @@ def is_tracked(scene: Scene, effect: PropertyGroup, strip: Strip, index: int | N
 
 
 def tripod(effect: PropertyGroup, key: bool = False) -> None:
-    """Make the active shutter follow the camera, fully open around the frame.
+    """Make the active shutter's exposure follow the camera, so that it looks as if the camera stood still.
 
-    Without a region it covers nothing, so the default shutter is used instead.
+    The shutter is fully open around the shown frame. If it has no region, and so covers nothing, the default shutter is
+    used instead.
 
     Args:
-        key: insert keyframes for the bars.
+        key: Insert keyframes for the bars.
 
     Raises:
-        EffectError: the window has no length. Nothing has changed.
+        EffectError: The window's length is out of range. Nothing has changed.
     """
     index, name = effect.active_shutter, effect.shutters[effect.active_shutter].name
     if not any(region.shutter == name for region in effect.regions):
