@@ -312,7 +312,7 @@ def _keys(fits: _Fits, eases: Mapping[float, Ease], words: Mapping[float, Ease],
         return [(frame, "linear") for frame in shown]
 
     def per_frame(outside: range, held: float) -> list[tuple[float, Ease]]:
-        """Return a key for every frame outside all keys, unless the value at `held` fits."""
+        """Return a key for each frame of `outside`, before or after all keys; none if the value at `held` fits."""
         return [] if all(fits(held, held, frame, 0) for frame in outside) else [(frame, "linear") for frame in outside]
 
     kept = per_frame(range(shown.start, min(math.ceil(frames[0]), shown.stop)), frames[0])
