@@ -108,7 +108,7 @@ def _tiles(source: FrameSource) -> Iterator[Tile]:
 
 
 class CPUCompositor:
-    """Composes pictures with NumPy: the methods of request.Compositor and request.Stages."""
+    """Composes pictures with NumPy. It has the methods of request.Compositor and of request.Stages."""
 
     name = "NumPy"
     takes_planes = False

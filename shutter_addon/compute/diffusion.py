@@ -33,8 +33,7 @@ def diffuse(labels: np.ndarray, count: int, guide: np.ndarray | None = None, str
         labels: (H, W): 0 where a pixel is free, 1 + shutter where that shutter is drawn.
         count: The number of shutters.
         guide: The picture whose edges stop the diffusion, (h, w, 3 or more), as for core.pixels.conductances; its cells
-            are
-        1, 2, 4, … pixels wide. None: nothing stops it.
+            are 1, 2, 4, … pixels wide. None: nothing stops it.
         strength: 0 to 1, how strictly edges stop it.
     """
     drawn = np.flatnonzero(np.bincount(labels.ravel(), minlength=count + 1)[1:])  # the others are 0 everywhere

@@ -117,7 +117,10 @@ class _Grid:
 
 
 class Diffusion:
-    """Solves for coefficients on a device. Its textures are kept until the size or the number of shutters changes."""
+    """Solves for how much of each shutter a pixel gets, as it spreads from drawn strokes, on a device.
+
+    Its textures are kept until the size or the number of shutters changes.
+    """
 
     finest = operators("LABELS")  # the passes over pixels
     returns = False  # whether sweeps after a correction go backward
@@ -130,13 +133,13 @@ class Diffusion:
         self._textures = NamedTextures(device)
 
     def solve(self, labels: np.ndarray, count: int, *, warm: bool = False) -> Texture:
-        """Return the coefficients of all shutters on the device, like compute.diffusion.diffuse without a guide.
+        """Return how much of each shutter a pixel gets, like compute.diffusion.diffuse without a guide, on the device.
 
         Args:
             labels: (H, W) uint16: 0 where a pixel is free, 1 + shutter where that shutter is drawn.
             count: The number of shutters.
             warm: Start from the last solution, if it has this size and count. It is faster if scribbles moved a little,
-            and the result depends on the last solution, within the error.
+                and the result depends on the last solution, within the error.
 
         Returns:
             A texture array rgba32f, shutter i in layer i // 4 and channel i % 4. The next call overwrites it.
@@ -284,7 +287,13 @@ class Diffusion:
         self._run(_PROLONG, grid, tiles, 16, grid.layers, **coarser, **images, amount=amount)
 
     def _restrict(self, grid: _Grid, coarse: _Grid, own: Texture) -> None:
-        """Make the right-hand side of the next coarser grid from the residual of a grid's values `own`."""
+        """Make the right-hand side of the next coarser grid from the residual of a grid's values, as multigrid does.
+
+        Args:
+            grid: The grid.
+            coarse: The next coarser grid.
+            own: The values.
+        """
         to = {"coarse": coarse.size, "next": coarse.textures["right"]}
         self._run(self._pass(grid, "restrict"), grid, "feeding", 16, grid.layers, own=own, **to)
 
@@ -311,7 +320,7 @@ class Diffusion:
         return self.finest[name] if grid.finest else _COARSER[name]
 
     def _finish(self) -> None:
-        """Turn the solution into coefficients in all cells, from the coarsest grid to the finest."""
+        """Turn the solution into coefficients ≥ 0 with a sum of 1 in all cells, the coarsest grid first."""
         for index, grid in reversed(list(enumerate(self._grids))):
             self._run(FINISH, grid, "near", 64, nothing=NOTHING)
             if index + 1 < len(self._grids):
@@ -389,7 +398,7 @@ def _last_ones(grid: _Grid) -> np.ndarray:
 
 
 def _grown(tiles: np.ndarray, times: int = 1) -> np.ndarray:
-    """Return tiles (rows, columns) bool, with those around them, up to a distance of `times` tiles."""
+    """Return which tiles (rows, columns) are set in `tiles`, or within `times` tiles of a set one, also diagonally."""
     for _ in range(times):
         rows = tiles.copy()
         rows[1:] |= tiles[:-1]

@@ -44,9 +44,9 @@ _SUM = read_pass("edge_diffusion", "SUM")
 
 
 class EdgeDiffusion(Diffusion):
-    """Solves for coefficients that stop at edges, on a device.
+    """Solves for how much of each shutter a pixel gets, as it spreads from drawn strokes up to edges of the picture.
 
-    It differs from Diffusion by other passes for pixels, and by conjugate gradients on one grid.
+    It runs on a device, and differs from Diffusion by other passes for pixels, and by conjugate gradients on one grid.
     """
 
     finest = operators("LINKS")
@@ -58,9 +58,9 @@ class EdgeDiffusion(Diffusion):
         self._solved, self._sweeps, self._iterations = 0, 0, 0
 
     def solve(self, labels: np.ndarray, count: int, guide: np.ndarray, strength: float) -> Texture:  # type: ignore[override]  # it has a guide
-        """Return the coefficients of all shutters on the device, like compute.diffusion.diffuse with a guide.
+        """Return how much of each shutter a pixel gets, like compute.diffusion.diffuse with a guide, on the device.
 
-        They do not depend on earlier solves. Some pixels must be drawn on, and some free. If the guide's cells are
+        It does not depend on earlier solves. Some pixels must be drawn on, and some free. If the guide's cells are
         pixels, one number is read back after each cycle: whether it was enough.
 
         Args:

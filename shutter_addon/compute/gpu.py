@@ -208,11 +208,16 @@ class GPUCompositor:
         return Stages(self.device)
 
     def labels(self, values: np.ndarray) -> Texture:
-        """Return labels (H, W) uint16 as a texture r32ui, valid until the next call."""
+        """Send labels (H, W) uint16 to the device, and return them as a texture r32ui, valid until the next call."""
         return self._textures.filled("labels", [values.astype(np.uint32)], "r32ui")
 
     def coefficients(self, handle: Texture, count: int) -> np.ndarray:
-        """Return the coefficients (count, h, w) float32 of a texture array with four shutters to a layer."""
+        """Return how much of each shutter a pixel gets, (count, h, w) float32, from a texture array.
+
+        Args:
+            handle: The texture array, with four shutters to a layer.
+            count: The number of shutters.
+        """
         values = self.device.read(handle)
         return np.moveaxis(values, -1, 1).reshape(-1, *values.shape[1:3])[:count]
 
@@ -324,7 +329,10 @@ class GPUCompositor:
         return picture
 
     def _draw_ways(self, window: Handle, request: Request, coefficients: Coefficients) -> Texture:
-        """Draw a picture whose shutters combine frames in several ways: one picture for each way, mixed. As `draw`."""
+        """Draw a picture whose shutters combine frames in several ways, such as average and lightest.
+
+        A picture is drawn for each way, and these are mixed. Arguments and result as for `draw`.
+        """
         state, size = request.state, (window.source.width, window.source.height)
         groups = list(state.groups.values())
         for number, chosen in enumerate(groups):
@@ -340,7 +348,7 @@ class GPUCompositor:
         return window.picture(levels=True) if request.levels else window.mixed()
 
     def _selected(self, handle: Texture, chosen: tuple[int, ...], count: int) -> tuple[Texture, Texture]:
-        """Return the coefficients of some shutters, scaled to a sum of 1, and that sum, until the next call.
+        """Return how much of some shutters a pixel gets, scaled to a sum of 1, and that sum, until the next call.
 
         Args:
             handle: The coefficients of all shutters.
@@ -359,9 +367,10 @@ class GPUCompositor:
         return selected, share
 
     def _draw_on_host(self, window: Handle, request: Request, coefficients: Coefficients) -> Texture:
-        """Draw a median of frames with NumPy that the device cannot draw, and send it to the device. As `draw`.
+        """Draw a median of frames with NumPy that the device cannot draw, and send it to the device.
 
-        Those of following exposures need all frames in one pass. Others take too many loop iterations for llvmpipe.
+        Those of exposures that follow something need all frames in one pass. Others take too many loop iterations for
+        llvmpipe. Arguments and result as for `draw`.
         """
         host, source, options = cpu.CPUCompositor(), window.source, request.state.options
         frames = host.window(source)
@@ -374,9 +383,9 @@ class GPUCompositor:
         return picture
 
     def _draw_moved(self, window: WholeFrames, request: Request, coefficients: Coefficients) -> Texture:
-        """Draw a picture whose shutters follow something. As `draw`.
+        """Draw a picture whose shutters follow a motion.
 
-        For each texture array of frames, a pass adds to the result of the last one.
+        For each texture array of frames, a pass adds to the last one's result. Arguments and result as for `draw`.
         """
         state, options, size = request.state, request.state.options, (window.source.width, window.source.height)
         (combine,), (first, last) = state.groups, state.open_span

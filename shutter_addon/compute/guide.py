@@ -73,7 +73,7 @@ class Guides:
             self._made.clear()
 
     def note(self, index: int, frame: Decoded) -> None:
-        """Use a frame that was read for something else, if it is needed and not there yet."""
+        """Keep a reduced copy of a frame that was read for something else, if a guide will need it."""
         if index in self._kept and index not in self._reduced:
             self._reduced[index] = self._reduce(as_rgba(frame))
 
@@ -87,8 +87,7 @@ class Guides:
         Args:
             frames: From `guiding`. Any but the first are skipped if they cannot be read.
             block: The side in pixels of the blocks that share coefficients. In a large frame, cells are larger, since
-                the guide
-            has no finer detail.
+                the guide has no finer detail.
         """
         return self._made.get((frames, block), lambda: self._guide(frames, block))
 

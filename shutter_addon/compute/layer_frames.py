@@ -280,7 +280,7 @@ class LayerColors:
         return self._separates and self._source.step > 1
 
     def weights(self, layer: int) -> Callable[[int], np.ndarray]:
-        """Return a function of a frame: how much (H, W) of a layer it shows, or with −1 of what lies behind all."""
+        """Return a function of a source frame: it gives how much (H, W) of a layer, or the background (−1), is seen."""
         if layer >= 0:
             return lambda frame: self._mattes.one(self.layers, frame, layer)
         if self._uncovers:

@@ -95,9 +95,10 @@ class LayeredRenderer:
     def _composed(
         self, request: Request, parts: Parts, coefficients: Coefficients, shot: range, plain: Callable[[], Handle]
     ) -> Handle:
-        """Return the picture, with windows of the present size. Arguments as for `draw`.
+        """Return the picture of `draw`, which calls this again with smaller windows if it fails.
 
         Args:
+            request, coefficients, shot, plain: As for `draw`.
             parts: The requests of the picture's parts.
 
         Raises:

@@ -68,8 +68,7 @@ class LabelLayer(NamedTuple):
     Attributes:
         share: The share, 0 to 1; those of all LabelLayers sum to 1 (scribbles.layers).
         labels: (h, w) uint16, one for each block of Options.aggregate pixels a side: 0 where nothing is drawn, 1 +
-            shutter
-        where that shutter is drawn.
+            shutter where that shutter is drawn.
         sole: The index of the shutter that all pixels get, if there is only one. None: there are several.
         key: A hashable value that is equal for equal labels and shares.
     """
@@ -161,9 +160,14 @@ class Renderer:
         return self._layered
 
     def _solved_apart(self, source: FrameSource, state: FrameState, index: int) -> np.ndarray:
-        """Return the coefficients (N, h, w) float32 of a state (Layers.scribbles) at a frame of a source.
+        """Return the coefficients (N, h, w) float32 from which the mattes of drawn layers are made.
 
-        A second renderer solves for them, which keeps this one's results.
+        A second renderer solves for them, so that this one keeps its own results.
+
+        Args:
+            source: The footage.
+            state: A state of Layers.scribbles.
+            index: The source frame.
         """
         if self._scribbles is None:
             self._scribbles = Renderer(self.compositor, source)
@@ -181,7 +185,10 @@ class Renderer:
             return np.broadcast_to(self.compositor.coefficients(drawn.handle, count), (count, height, width))
 
     def drawn_coefficients(self, request: Request) -> Coefficients:
-        """Return the coefficients of all shutters, without layers, on the device, until the next call of any method."""
+        """Return how much of each shutter a pixel gets (coefficients), without layers, on the device.
+
+        They are valid until the next call of any method.
+        """
         labels = self.labels(request)
         with self.compositor.current():
             return self._coefficients(request, labels, len(request.state.bars))
@@ -202,7 +209,7 @@ class Renderer:
         return values.astype(np.float32)
 
     def drawn_with_layers(self, request: Request) -> Coefficients:
-        """Return the coefficients of all shutters on the device, with the mattes of layers laid over.
+        """Return how much of each shutter a pixel gets, with the mattes of layers laid over, on the device.
 
         They are valid until the next call of any method.
         """
@@ -213,9 +220,10 @@ class Renderer:
             return Coefficients(self._stages.upload(values), 1)
 
     def drawn_labels(self, request: Request) -> tuple[Handle, int]:
-        """Return the labels of all visible scribbles on a GPU, for the preview, and the side of their blocks in pixels.
+        """Return which shutter is drawn on which pixel (labels), as a GPU texture for the preview, and their block.
 
-        They are a texture array r32ui, top row first, valid until the next call of any method.
+        The texture array is r32ui, top row first, and valid until the next call of any method. One label is for block ×
+        block pixels.
         """
         with self.compositor.current():
             return self.compositor.labels(self.labels(request)[0].labels), request.state.options.aggregate
@@ -323,7 +331,10 @@ class Renderer:
         return guide.guiding(request.index, request.state.options.step, shot)
 
     def _exposing(self, request: Request, labels: list[LabelLayer]) -> Request:
-        """Return the request with only one shutter if all pixels get that one, else the request itself."""
+        """Return the request with only one shutter if all pixels get that one, else the request itself.
+
+        Frames that only other shutters would expose are then not read.
+        """
         sole = _sole(request, labels)
         return request if sole is None else replace(request, state=request.state.of([sole]))
 
@@ -347,8 +358,7 @@ class Renderer:
 
         Returns:
             Its length in frames, whether exposures follow something, the number of shutters, and whether all of these
-            average
-            frames, so that sums suffice.
+            average frames, so that sums suffice.
         """
         exposing = self._exposing(request, self.labels(request)).state
         return request.state.options.window, exposing.following is not None, len(request.state.bars), exposing.averages
@@ -364,27 +374,26 @@ class Renderer:
             self._guides.keep(i for i in onwards if i % step == 0 or i == index)
 
     def _coefficients(self, request: Request, labels: list[LabelLayer], count: int = 1) -> Coefficients:
-        """Return the coefficients of a picture on the device, for its composition.
+        """Return how much of each shutter a pixel gets (coefficients), on the device, from strokes and mattes.
 
         Args:
             request: The picture.
             labels: Of its scribbles.
             count: If all pixels get one shutter: the number of shutters among which it counts. 1: that one alone, as
-                for
-            `_exposing`.
+                for `_exposing`.
         """
         if (sole := _sole(request, labels)) is not None:
             return self._constant(np.eye(count)[sole if count > 1 else 0])
         return Coefficients(self._with_mattes(request, labels), request.state.options.aggregate)
 
     def _constant(self, values: np.ndarray) -> Coefficients:
-        """Return the same coefficients (N,) for all pixels, on the device: one block that covers the picture."""
+        """Return one set of coefficients (N,) for all pixels, on the device: a block that covers the picture."""
         return Coefficients(self._stages.upload(values[:, None, None]), max(self.source.width, self.source.height))
 
     def _with_mattes(self, request: Request, labels: list[LabelLayer]) -> Handle:
-        """Return the coefficients of scribbles with mattes laid over them, on the device.
+        """Return how much of each shutter a pixel gets, from strokes with mattes laid over, on the device.
 
-        They are kept until either changes.
+        These coefficients are kept until either changes.
         """
         state = request.state
         if not state.mattes or self._mattes is None:
@@ -399,9 +408,10 @@ class Renderer:
         return self._kept_mattes.get(key, lambda: self._stages.blend(beneath, state.mattes, values))
 
     def _diffused(self, request: Request, labels: list[LabelLayer]) -> Handle:
-        """Return the coefficients that are diffused from scribbles, on the device.
+        """Return how much of each shutter a pixel gets, as it spreads from drawn strokes, on the device.
 
-        They are kept until labels or guides change, or until a request that is not quick needs an exact solution.
+        These coefficients are kept until labels or guides change, or until a request that is not quick needs an exact
+        solution.
         """
         options, count = request.state.options, len(request.state.bars)
         frames = self._guiding(request, self.shot(request)) if options.edge_aware else ()
@@ -415,7 +425,7 @@ class Renderer:
         return self._kept_diffusion.get(key, solve, quick=request.quick)
 
     def _solved_layers(self, layers: list[LabelLayer], count: int, guided: tuple, quick: bool) -> Handle:
-        """Return the coefficients of all LabelLayers, added up by their shares.
+        """Return the sum of the coefficients that are diffused from each LabelLayer, times its share.
 
         Args:
             layers: The LabelLayers.
@@ -444,7 +454,7 @@ class Renderer:
             self._kept_picture.clear()
 
     def release(self) -> None:
-        """Free all memory on the device, and the frames of the search for cuts. The next picture reads them again."""
+        """Free all memory on the device, and frames kept from the search for cuts. They are read again when needed."""
         with self.compositor.freeing():
             self._drop_window()
             self._stages.release()

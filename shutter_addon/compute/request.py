@@ -82,8 +82,8 @@ class Exposure(NamedTuple):
     """A composed layer, or the composed background behind all layers. For opaque frames, both pictures are the same.
 
     Attributes:
-        color: Its picture.
-        share: A picture whose alpha is the share of each pixel's exposure that shows it.
+        color: Its picture, premultiplied.
+        share: A picture whose alpha says how much of each pixel's exposure time the layer, or the background, fills.
     """
 
     color: Handle
@@ -111,7 +111,7 @@ class Stages(Protocol):
     """
 
     def solve(self, labels: np.ndarray, count: int, *guided: Any, warm: bool = False) -> Handle:
-        """Return coefficients on the device, diffused from labels as by compute.diffusion.diffuse.
+        """Return how much of each shutter a pixel gets, as compute.diffusion.diffuse does, on the device.
 
         Args:
             labels: (h, w) uint16: 0 where nothing is drawn, 1 + shutter where that shutter is drawn.
@@ -121,14 +121,18 @@ class Stages(Protocol):
         """
 
     def upload(self, values: np.ndarray) -> Handle:
-        """Return coefficients on the device for an array (N, h, w), or (N, 1, 1) for the whole picture."""
+        """Send coefficients (how much of each shutter a pixel gets) to the device, and return them there.
+
+        Args:
+            values: (N, h, w), or (N, 1, 1) for the whole picture.
+        """
 
     def add(self, mixed: Handle | None, added: Handle, share: float, size: tuple[int, int]) -> Handle:
-        """Return a sum of coefficients on the device, with a share of others added.
+        """Add a share of some coefficients to a sum, and return the new sum on the device.
 
         Args:
             mixed: The sum so far. None: start one.
-            added: The other coefficients.
+            added: The coefficients.
             share: The share, 0 to 1.
             size: (h, w) of the sum.
         """
@@ -136,16 +140,16 @@ class Stages(Protocol):
     def blend(
         self, beneath: Handle, mattes: tuple[Matte, ...], layers: Sequence[tuple[Hashable, np.ndarray]]
     ) -> Handle:
-        """Return coefficients with mattes laid over them (core.model.mattes.blended), on the device.
+        """Lay mattes over coefficients (core.model.mattes.blended), and return the new coefficients on the device.
 
         Args:
-            beneath: The coefficients.
+            beneath: The coefficients: how much of each shutter a pixel gets.
             mattes: The mattes.
             layers: (key, values) of each matte: values (h, w) float32, and a key that is equal for equal values.
         """
 
     def least_share(self, exposed: Exposure) -> float:
-        """Return the lowest alpha of exposed.share: the least share of any pixel's exposure that it has."""
+        """Return the lowest alpha of exposed.share, of any pixel. A low one tells that a plate has to be made."""
 
     def lay(self, behind: Behind, layers: Sequence[Exposure], levels: bool) -> Handle:
         """Return the picture of layers laid over the background (core.pixels.layering), on the device.
@@ -192,13 +196,20 @@ class Compositor(Protocol):
     def stages(self) -> Stages: ...
 
     def labels(self, values: np.ndarray) -> Handle:
-        """Return labels (H, W) uint16 on the device (on a GPU a texture r32ui), valid until the next call."""
-
-    def coefficients(self, handle: Handle, count: int) -> np.ndarray:
-        """Return coefficients on the device as an array (count, h, w) float32.
+        """Send labels to the device, and return them there, until the next call.
 
         Args:
-            handle: The coefficients.
+            values: (H, W) uint16: 0 where nothing is drawn, 1 + shutter where that shutter is drawn.
+
+        Returns:
+            On a GPU a texture r32ui.
+        """
+
+    def coefficients(self, handle: Handle, count: int) -> np.ndarray:
+        """Return how much of each shutter a pixel gets as an array (count, h, w) float32, from the device.
+
+        Args:
+            handle: The coefficients on the device.
             count: The number of shutters.
         """
 

@@ -32,7 +32,7 @@ def accumulation(decode: int, sent: str, back: bool, tiled: bool, cover: int = 0
     Args:
         decode: From `decoding`.
         sent: How the frame was sent: "COLOURS", "NUMBERS" (Device.send), "PLANES" or "MOMENT". "AGAIN": it is the
-        difference of two sums that are there already.
+            difference of two sums that are there already.
         back: Whether it is subtracted.
         tiled: Whether sums are stored in tiles.
         cover: Which weights frames have: 0 none, 1 those of a layer, 2 those of the background behind layers.

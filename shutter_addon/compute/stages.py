@@ -34,9 +34,10 @@ class Stages:
         self._held: dict[int, Hashable] = {}  # {layer of _mattes: key of the values in it}
 
     def solve(self, labels: np.ndarray, count: int, *guided: Any, warm: bool = False) -> Texture:
-        """Return coefficients diffused from labels (request.Stages.solve), with or without a guide.
+        """Return how much of each shutter a pixel gets (coefficients), diffused from labels, as a texture.
 
-        The memory of the other kind of diffusion is freed.
+        See request.Stages.solve. There are two kinds of diffusion, with and without a guide; the memory of the other is
+        freed.
         """
         if guided and 0 < np.count_nonzero(labels) < labels.size:  # else nothing is diffused
             self._plain.release()
@@ -45,13 +46,13 @@ class Stages:
         return self._plain.solve(labels, count, warm=warm)
 
     def upload(self, values: np.ndarray) -> Texture:
-        """Return coefficients (N, h, w), or (N, 1, 1) for the whole picture, as a texture."""
+        """Send coefficients (N, h, w), or (N, 1, 1) for the whole picture, to the device: return them as a texture."""
         name = "constant" if values.shape[1:] == (1, 1) else "uploaded"
         fours = np.moveaxis(padded(np.moveaxis(values, 0, -1)), 2, 0)  # layers (⌈N/4⌉, h, w, 4)
         return self._textures.filled(name, fours.astype(np.float32))
 
     def add(self, mixed: Texture | None, added: Texture, share: float, size: tuple[int, int]) -> Texture:
-        """Return a sum of coefficients with a share of others added (request.Stages.add)."""
+        """Add a share of some coefficients to the sum so far, and return the new sum (request.Stages.add)."""
         height, width = size
         result = self._textures.of("sum", (width, height, added.size[2]), "rgba32f")
         whole = self._textures.filled("share", [np.full((1, 1, 1), share, np.float32)], "r32f")
@@ -64,7 +65,7 @@ class Stages:
     def blend(
         self, beneath: Texture, mattes: tuple[Matte, ...], layers: Sequence[tuple[Hashable, np.ndarray]]
     ) -> Texture:
-        """Return coefficients with mattes laid over them (request.Stages.blend).
+        """Lay mattes over coefficients, and return the new coefficients (request.Stages.blend).
 
         The last values of mattes stay on the device, and are not sent again.
         """
@@ -95,7 +96,7 @@ class Stages:
         return beneath
 
     def least_share(self, exposed: Exposure) -> float:
-        """Return the lowest share of any pixel (request.Stages.least_share). The device finds it for each block."""
+        """Return the lowest alpha of exposed.share (request.Stages.least_share). The device finds it for each block."""
         width, height, _ = exposed.share.size
         least = self._textures.of("least", (-(-width // BLOCK), -(-height // BLOCK), 1), "r32f")
         images = {"clear": exposed.share, "least": least}

@@ -60,15 +60,17 @@ class Part(NamedTuple):
 
 
 class Window:
-    """The base of all windows: a texture array for each part, and the textures that the compositor draws into.
+    """The base of all windows, which hold the source frames that a picture exposes in texture arrays on a device.
 
-    Whether a window fits depends on sizes and on the device's budget, but not on the free memory. So a picture has the
-    same bits whatever was rendered before. A window is released if another one needs its memory.
+    It also has the textures that the compositor draws into. Whether a window fits depends on sizes and on the device's
+    budget, but not on the free memory. So a picture has the same bits whatever was rendered before. A window is
+    released if another one needs its memory.
 
     Attributes:
         capacity: The most frames that it holds.
         layers: The layers of all texture arrays.
         kind: Their GLSL format.
+        parts: What part of the window each texture array has.
         shutters: The number of shutters of its pictures.
         is_open: Whether it has its textures; a released window cannot be used again.
         sends: Whether every picture sends all frames, because the device has no room for them.

@@ -31,8 +31,7 @@ class LastValue(Generic[T]):
             key: Everything that the value depends on, as hashable plain data.
             make: Makes the value.
             quick: Whether an approximation suffices, as the cached value or as what `make` returns. A request that is
-                not quick
-            does not get an approximation.
+                not quick does not get an approximation.
         """
         if self._kept is None or self._kept[0] != key or not (quick or self._kept[2]):
             self.clear()

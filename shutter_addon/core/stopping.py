@@ -24,7 +24,7 @@ def never() -> bool:
 
 @dataclass
 class Slice:
-    """A time slice of work that would block the window for too long. It continues in the next slice.
+    """A time slice of work that would freeze the window if it ran in one go. The next slice continues it.
 
     Calling it returns whether its time is over.
 
@@ -50,7 +50,9 @@ _LONGER, _AGAIN = 1.02, 1.5
 
 @dataclass
 class Slices:
-    """The successive time slices in which one result is made. Each is longer than the last one, so that all work ends.
+    """Time slices in which one result is made piece by piece, so that the window does not freeze.
+
+    Each is longer than the last one, so that all work ends.
 
     Attributes:
         key: Which result is being made.

@@ -71,7 +71,7 @@ def beside(steps: Iterable[T], patience: float | None) -> Generator[T | None, No
     Args:
         steps: What to iterate over.
         patience: Seconds without a result after which None is yielded, so that the caller can do something else. None:
-        never.
+            never.
     """
     ended, results = threading.Event(), queue.SimpleQueue[tuple[T | None, Exception | None, bool]]()
     thread = daemon(_find, steps, ended, results)

@@ -62,7 +62,7 @@ class Budget:
             return fits
 
     def give_back(self, size: int) -> None:
-        """Return `size` bytes that were taken."""
+        """Make `size` bytes free that were taken."""
         with self._lock:
             self.used -= size
 
@@ -170,7 +170,7 @@ class Device:
             height: In texels.
             layers: Their number.
             kind: A GLSL format: rgba8, rgba16, rgba16f, rgba16ui, rgba32ui, rgba32f, r32f or r32ui. Passes read rgba8
-            and rgba16 as 0 … 1, and nothing with filtering.
+                and rgba16 as 0 … 1, and nothing with filtering.
 
         Raises:
             NoDeviceError: The device has no room for it.

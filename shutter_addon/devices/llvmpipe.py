@@ -23,8 +23,8 @@ def is_llvmpipe(renderer: str) -> bool:
 def frames_iterations(values: np.ndarray, span: tuple[int, int]) -> int:
     """Return the most loop iterations that an invocation of the pass compose_frames can take, for any coefficients.
 
-    llvmpipe ends loops after MOST_ITERATIONS. A piece counts for every frame from the one in which it may begin to the
-    one in which it and all before it have ended.
+    llvmpipe ends loops after 65,535 without an error. Each piece (a row of the table) counts for every frame from the
+    one in which it may begin to the one in which it and all before it have ended.
 
     Args:
         values: The table of shutters (composition_passes.table).

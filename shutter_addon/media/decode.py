@@ -258,8 +258,7 @@ class _Run:
 
         Args:
             seeking: Begin at the first key frame, and skip frames shown before it: they may depend on frames that were
-                not
-            decoded (an open group of pictures).
+                not decoded (an open group of pictures).
         """
         floor: float | None = None if seeking else -math.inf
         misleading = self.file.container.format.name in MISLEADING

@@ -85,7 +85,7 @@ def _stream(container: OutputContainer, shape: Sequence[int], fps: Fraction) -> 
 
 
 def _frame(picture: np.ndarray, stream: VideoStream, index: int) -> VideoFrame:
-    """Return the video frame with a number for a picture (H, W, 3 or 4) uint8."""
+    """Return a picture (H, W, 3 or 4) uint8 as the frame of a stream with an index, in the stream's pixel format."""
     import av
 
     levels = np.ascontiguousarray(picture[..., :3])

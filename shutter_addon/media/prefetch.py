@@ -1,4 +1,4 @@
-"""A source that decodes frames ahead of time on a thread."""
+"""A source that decodes frames ahead of time, on a thread, in the order in which they will be read."""
 
 import threading
 from collections.abc import Iterable
@@ -52,8 +52,7 @@ class PrefetchSource(SourceWrapper):
         Raises:
             MediaError: The source cannot read it, or `close` was called meanwhile.
             core.stopping.StoppedError: The frame is no longer wanted; or it is not decoded yet, and this step may not
-                wait
-            (stopping.waits).
+                wait (stopping.waits).
         """
         picture = as_rgba(self.decoded(index))
         picture.flags.writeable = False

@@ -244,7 +244,7 @@ def by_number(path: Path, *, listed: bool = False) -> Callable[[int], Path] | No
     Args:
         path: The file.
         listed: Whether the other files of the folder decide which number is that of the frame (MediaError: it cannot be
-        listed). Otherwise it is the last one, as in Blender's movie clips.
+            listed). Otherwise it is the last one, as in Blender's movie clips.
     """
     parts = _frame_number(path)[0] if listed else next(iter(_numbers(path.stem)), None)
     if parts is None:

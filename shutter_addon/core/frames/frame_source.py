@@ -154,9 +154,9 @@ class Moment:
         ends: The two frames (H, W, 4), of a FrameSource's type.
         number, steps: It lies number / steps of the way from the first frame to the second.
         vectors: uint16 (keys − 1, ⌈H / STEP⌉, ⌈W / STEP⌉, 4), shared by the moments of a pair; keys is a power of two.
-        The key moment k, of 1 … keys − 1, has vectors[k − 1], for every STEPth pixel: x and y of the path from the
-        first frame to the second that passes there, in 1 / UNIT of a pixel from ZERO; and how surely the first and
-        the second frame show what follows it, 0 to 255. Between these pixels they are bilinear.
+            The key moment k, of 1 … keys − 1, has vectors[k − 1], for every STEPth pixel: x and y of the path from the
+            first frame to the second that passes there, in 1 / UNIT of a pixel from ZERO; and how surely the first and
+            the second frame show what follows it, 0 to 255. Between these pixels they are bilinear.
         levels: uint8, one for each tile of TILE pixels, shared by the pair: its key moments are keys / 2^level apart.
         between: What makes the moments of the pair.
     """
@@ -199,13 +199,12 @@ class ShotFinder(Protocol):
         Args:
             index: The frame.
             low, high: The first and last frame that matter. Cuts beyond are not searched: the range then goes to the
-                clip's
-            start or end.
+                clip's start or end.
             known: Read nothing, and assume that there is no cut where nothing is known.
         """
 
     def lacking(self, index: int, low: int, high: int) -> set[int]:
-        """Return the frames that `around` would read for these arguments, if it found no more cuts."""
+        """Return the frames that `around` would have to read for the same arguments, if it finds no new cuts."""
 
     def handed(self) -> set[int]:
         """Return the frames that were read and are kept for `read`."""

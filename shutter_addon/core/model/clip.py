@@ -43,7 +43,7 @@ class Clip:
         step: Every step-th frame was filmed, from the first on; the others are moments.
         fps: Frames per second; None for images.
         timing: Which frame a timeline frame shows: the timing of a strip, or a channel of source time (Effect.time).
-        None: timeline frame 1 shows the first filmed frame, and so on, as in recipes.
+            None: timeline frame 1 shows the first filmed frame, and so on, as in recipes.
     """
 
     width: int

@@ -82,7 +82,7 @@ class Subject:
     drawings: Drawings | None = None
 
     def placement(self, frame: float) -> Placement:
-        """Return the keyed placement at a frame."""
+        """Return where keys put the subject at a frame, apart from what is drawn."""
         return self.moves.at(frame)
 
     def centre(self, frame: float) -> np.ndarray | None:
@@ -192,7 +192,7 @@ class OutlineRegion(MatteRegion):
     Attributes:
         drawings: The curves, at the frames where they are drawn.
         between: How the matte changes from one drawing to the next: "carried" follows the footage, "straight" moves the
-        curves' points in straight lines.
+            curves' points in straight lines.
         content: Channel of mattes.FileFrame or mattes.Outline.
     """
 
@@ -281,7 +281,12 @@ class RampContent:
 
 
 def placed_ramp(kind: mattes.RampKind, moves: Moves) -> Channel:
-    """Return a channel of mattes.Ramp that lies where the moves place it at each frame."""
+    """Return a channel of mattes.Ramp that keys move.
+
+    Args:
+        kind: The ramp's shape.
+        moves: Where it lies at each frame.
+    """
 
     return keyframes.Computed(lambda frame: mattes.Ramp(kind, moves.at(frame)))
 
@@ -412,7 +417,7 @@ class Effect:
         regions: Later regions lie over earlier ones, and all mattes lie over all scribbles.
         options: Channel of frame_state.Options. Its `edge_aware` does not count: that has a channel here.
         time: Channel of (source frame, whether the footage runs backward); its first frame is 1. None: the strip's own
-        timing counts.
+            timing counts.
         camera: A subject that shutters can follow.
         lost: A warning that this recipe of an older version cannot look as it did, or None.
     """

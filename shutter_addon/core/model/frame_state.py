@@ -31,7 +31,7 @@ class Combine:
         mode: The average, lightest, darkest or median of the frames.
         by_luminance: For lightest and darkest: choose a pixel's frame by luminance, not for each color channel.
         threshold: For lightest and darkest: the luminance of linear light above which a frame leaves a trail (below
-        which, for darkest); white is 1. None: every frame does.
+            which, for darkest); white is 1. None: every frame does.
         softness: The range of luminance around the threshold in which trails fade in.
     """
 
@@ -51,7 +51,7 @@ class Options:
 
     Attributes:
         window: The length L of the window (the frames that can be exposed) in filmed frames. In a FrameState it counts
-        moments, `step` per filmed frame.
+            moments, `step` per filmed frame.
         edge_aware: 0 to 1, how strictly scribbles stop at edges of the shown frame (core/pixels/conductances.py).
         step: Moments per filmed frame. "auto", which only an effect's options have, chooses by the footage.
         slid: Frames by which the window was moved onward, to lie inside the shot (core/model/windows.py).
@@ -133,8 +133,7 @@ class Following:
     Attributes:
         first: The source frame of the first row.
         turns, shifts: complex128 (S, N): a row for each source frame from `first` on, a column for each shutter. 1 and
-            0
-        for shutters that follow nothing.
+            0 for shutters that follow nothing.
     """
 
     first: int
@@ -182,7 +181,8 @@ class Layers:
         opacities: 0 to 1, (n,).
         first: The first source frame for which mattes are known.
         scribbles: A state for each source frame from `first` on, whose diffusion gives the mattes of drawn layers: its
-        coefficient 1 + i is the matte of layer i, coefficient 0 is what belongs to no layer. None without drawn layers.
+            coefficient 1 + i is the matte of layer i, coefficient 0 is what belongs to no layer. None without drawn
+            layers.
         mattes: For each of these frames the mattes (n,) of the layers; None for a drawn layer.
         camera: The camera's motion, as that of one shutter; None if it is unknown or still.
     """

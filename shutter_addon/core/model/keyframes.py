@@ -23,8 +23,7 @@ def eased(u: float, ease: Ease) -> float:
     Args:
         u: How much of the time between the two keys has passed, 0 to 1.
         ease: "linear"; "constant", which jumps at the end; or "bezier", whose flat handles are a third of the span
-            long,
-        which is u²(3 − 2u).
+            long, which is u²(3 − 2u).
     """
     if ease == "constant":
         return 0.0 if u < 1 else 1.0

@@ -54,8 +54,7 @@ class MaskSpline:
         points: Left handle, point and right handle, ((x, y), (x, y), (x, y)) each.
         weights: The width of the feather at each point.
         feathers: For each point, the feather points ((u, factor), …) of the segment that follows it, u ascending from 0
-            to
-        1. The factors multiply the points' weights.
+            to 1. The factors multiply the points' weights.
         cyclic: Whether the spline is closed.
         weight_interpolation: How the feather's width changes from point to point: "EASE" or "LINEAR".
     """
@@ -221,7 +220,7 @@ def _pixel_wide(edge: np.ndarray, feather: np.ndarray, pixel: float) -> np.ndarr
         edge: The spline's polygon (n, 2).
         feather: The feather's outer edge (n, 2).
         pixel: The least distance, in fractions of the picture. Points move along the previous point's normal, as in
-        Blender.
+            Blender.
     """
     steps = _normalized(np.roll(edge, 1, axis=0) - edge)
     along = _normalized(np.roll(steps, 1, axis=0) + steps)
@@ -246,7 +245,7 @@ def _fill(value: np.ndarray, polygons: list[np.ndarray], solver: str, holes: boo
         value: The pixels.
         polygons: In fractions of the picture.
         solver: How polygons are combined if there are holes, as MaskLayer.fill_solver: "CDT" sums their windings,
-        "SWEEP_LINE" is even-odd.
+            "SWEEP_LINE" is even-odd.
         holes: Whether polygons inside others make holes. Otherwise each polygon is filled by itself.
     """
     in_pixels = [polygon * value.shape[::-1] for polygon in polygons]
@@ -260,8 +259,7 @@ def feather(value: np.ndarray, quads: np.ndarray, falloff: Callable[[np.ndarray]
     Args:
         value: The pixels, with values 0 to 1.
         quads: Corners (n, 4, 2) in fractions of the picture. The value is 1 at the first two corners and 0 at the last
-            two,
-        and interpolated in between by mean value coordinates.
+            two, and interpolated in between by mean value coordinates.
         falloff: Converts interpolated values (0 to 1) to those of the pixels.
     """
     height, width = value.shape

@@ -35,8 +35,7 @@ class FileFrame:
         file: The file.
         offset: The number of frames that the matte plays ahead of the footage (or of `time`).
         time: Timeline frames since the one that shows the file's frame `offset`. None: the matte follows the footage,
-            and
-        shows the frame with the number of the footage's filmed frame plus `offset`.
+            and shows the frame with the number of the footage's filmed frame plus `offset`.
         timing: The timing of a strip that shows the file; `time` is then a timeline frame.
     """
 
@@ -70,7 +69,7 @@ class FileFrames:
         file: The file.
         offset: The number of frames that the matte plays ahead.
         first: The timeline frame that shows the file's frame `offset`; the file then plays along the timeline. None: it
-        follows the footage.
+            follows the footage.
         timing: The timing of a strip that shows the file. The others then do not count.
     """
 
@@ -140,8 +139,7 @@ class Matte:
         shutter: The index of the shutter that pixels get in proportion to the matte's values.
         content: What gives the values.
         blend: "over" leaves the rest to the regions beneath. "add" takes only from the default shutter, so that mattes
-            that
-        add up to 1 can be side by side.
+            that add up to 1 can be side by side.
         opacity: 0 to 1, a factor after inversion.
         feather: The width to which hard edges are blurred, as a fraction of the picture's height.
         invert: Whether each value v becomes 1 − v.

@@ -83,7 +83,7 @@ def corners(strokes: Iterable) -> np.ndarray:
 
 
 def offsets(strokes: Iterable) -> np.ndarray:
-    """Return the points (n, 2) of all strokes relative to their centre, in fractions of the picture."""
+    """Return all points (n, 2) of strokes relative to the strokes' common centre, in fractions of the picture."""
     return _points(strokes) - centre(strokes)
 
 

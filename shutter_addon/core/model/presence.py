@@ -66,8 +66,7 @@ def keys(
 
     Args:
         seen: Frames where the subject was found. A gap lasts from a stop to the next of these frames. If a stop is at
-            such
-        a frame, because another track has found the subject there, the gap is only that frame.
+            such a frame, because another track has found the subject there, the gap is only that frame.
         stops: Where tracks end. Without any, there are no keys.
         kept: Frames that keep the value 1, even next to a gap.
         fade: Frames of a fade. It is shorter between gaps that are close, and a jump at cuts.
@@ -108,7 +107,12 @@ def gaps(seen: Collection[int], stops: Iterable[Stop], beside: int = 0) -> list[
 
 
 def _gap(seen: Collection[int], stop: Stop) -> Gap:
-    """Return the gap that begins (or, tracked backward, ends) at a stop."""
+    """Return the frames without the subject that begin where tracking stopped, or end there if it went backward.
+
+    Args:
+        seen: Frames where the subject was found. They bound the gap; if tracking stopped at one, the gap is that frame.
+        stop: Where tracking stopped.
+    """
     frame = stop.frame
     if frame in seen:
         return Gap(first=frame, last=frame)

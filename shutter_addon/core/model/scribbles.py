@@ -45,13 +45,13 @@ class Shape:
 
 
 def layers(shapes: Collection[Shape]) -> list[tuple[float, tuple[Shape, ...]]]:
-    """Split shapes that have opacities into sets of opaque shapes, whose coefficients are then averaged.
+    """Split shapes that have opacities into sets of opaque shapes.
 
-    At an opacity of one half, coefficients are halfway between those with and without the shape.
+    How much of each shutter a pixel gets is the mean of what the sets give. So at an opacity of one half, it is halfway
+    between that with and that without the shape.
 
     Returns:
-        (share, shapes) for each set. The shares are the weights of the average, and sum to 1. The first set has all
-        shapes
+        (share, shapes) for each set. The shares are the weights of the mean, and sum to 1. The first set has all shapes
         with an opacity above 0.
     """
     steps = sorted({0.0, 1.0, *(shape.opacity for shape in shapes)})
@@ -149,11 +149,9 @@ class Drawings:
         eases: The ease from each drawing to the next.
         aspect: The picture's width / height.
         placement: Channel of the matrix (3, 3) from the strokes' coordinates to fractions of the picture, or of None
-            where
-        the strokes are not visible. Without a channel, strokes are fractions of the picture.
+            where the strokes are not visible. Without a channel, strokes are fractions of the picture.
         origins: The region's placement at the time of each drawing. It is taken out of the strokes, so that the
-            region's
-        keys bring them back to where they were drawn. Empty: the region was in its place.
+            region's keys bring them back to where they were drawn. Empty: the region was in its place.
     """
 
     name: str

@@ -278,8 +278,7 @@ class Filmed(NamedTuple):
     Attributes:
         bars: (L,).
         lost: Where they expose other moments: the numbers, from 1, of the first and last moment of the filmed frame
-            that
-        differs most. None: nowhere.
+            that differs most. None: nowhere.
     """
 
     bars: np.ndarray
@@ -296,8 +295,7 @@ def filmed(moments: ArrayLike, steps: int, position: str, spread: Callable[[np.n
         steps: Moments per filmed frame.
         position: Options.position.
         spread: Turns the new bars into bars of moments. If no new bars give the old moments again, each new bar is the
-            mean
-        of its frame's moments.
+            mean of its frame's moments.
     """
     moments = np.asarray(moments, dtype=np.float64)
     lacking = -len(moments) % steps

@@ -248,8 +248,7 @@ def times_of(clip: Clip, at: Shown, wanted: range, reach: int) -> list[float]:
         at: The shown frame.
         wanted: The source frames.
         reach: Timeline frames before and after the shown one that are searched. A source frame that is not shown there
-            has
-        the time of the nearest one that is.
+            has the time of the nearest one that is.
 
     Returns:
         Timeline frames, with a fraction if the timeline skips the source frame.
@@ -389,7 +388,7 @@ def with_length(bars: np.ndarray, way: np.ndarray, length: float, shown: float) 
         way: How far it has moved at the bars' boundaries (L + 1,), from `travelled`.
         length: The distance, in the same unit.
         shown: The time in 0 … L that keeps its place, clamped to the open bars. If the exposure reaches one end of the
-        window, it only grows towards the other.
+            window, it only grows towards the other.
     """
     bars = np.where(shutters.are_open(bars), bars, 0)
     first, last = shutters.open_span(bars)
@@ -440,8 +439,7 @@ def on_timeline(bars: np.ndarray, options: Options, positions: np.ndarray) -> np
         bars: (L,), the shape.
         options: Of the state.
         positions: The footage's positions (Clip.position) at n times (n odd) at even distances, from the previous
-            timeline
-        frame to the next one.
+            timeline frame to the next one.
     """
     window, here = len(bars), positions[len(positions) // 2]
     begin, anchor = {

@@ -33,7 +33,7 @@ class Sample(NamedTuple):
         light: (H, W, 4), premultiplied, as each pixel sees the frame.
         weight: (H, W), how much the frame counts at each pixel.
         shown: For the shown frame, its light (H, W, 4), which counts without regard to weights if there is a threshold;
-        None for other frames.
+            None for other frames.
     """
 
     light: np.ndarray
@@ -212,10 +212,10 @@ def compose(
         state: The effect at this frame, with N shutters of L bars.
         frames: L pictures (H, W, 4), scene-linear, premultiplied.
         present: (L,) bool, False for left out frames, whose share goes to the others. If none has a share, it goes to
-        the nearest present frame, preferring the earlier one.
+            the nearest present frame, preferring the earlier one.
         coefficients: (N, H, W), how much of each shutter a pixel gets; their sum is 1.
         moves: Turns and shifts (L, N) of frames for shutters (FrameState.following). A frame is sampled at Σ cᵢ Wᵢ(x)
-        instead of x, or by value interpolation at each Wᵢ(x) and mixed. None: nothing is followed.
+            instead of x, or by value interpolation at each Wᵢ(x) and mixed. None: nothing is followed.
         sharp: How `seen` samples frames; None: sharp if all of them are opaque.
     """
     if sharp is None:
@@ -331,7 +331,7 @@ def seen(frame: np.ndarray, places: np.ndarray, *, sharp: bool) -> np.ndarray:
         frame: The frame.
         places: The places.
         sharp: By Catmull-Rom's cubic, clamped to the four pixels around to avoid ringing. Otherwise linearly, as
-        colours with alpha need.
+            colours with alpha need.
     """
     height, width = frame.shape[:2]
     # Far outside everything is the same, and large numbers have no fractions.

@@ -23,7 +23,7 @@ def resistances(guide: np.ndarray, strength: float) -> np.ndarray:
 
     Args:
         guide: (h, w, 3 or more), finite: display colours, 0 … 1, times the rows of cells over 240 (compute/guide.py);
-        three channels count.
+            three channels count.
         strength: 0 … 1, how strictly scribbles stop at edges; 0 gives 1 everywhere, 1 the full contrast.
     """
     colours = np.pad(np.asarray(guide)[..., :3].astype(np.float32), ((1, 1), (1, 1), (0, 0)), mode="edge")

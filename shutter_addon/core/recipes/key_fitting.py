@@ -129,7 +129,10 @@ def _shutter(
 
 
 def _said(part: Any, shown: range) -> dict[str, Any]:
-    """Return the properties of an effect, shutter, region or camera as a recipe has them: with keys, or constant."""
+    """Return the properties of an effect, shutter, region or camera as a recipe has them: with keys, or constant.
+
+    They are by the names of the model's attributes.
+    """
     said: dict[str, Any] = {}
     for name, each in fields_of(type(part)).items():
         value = getattr(part, name)
@@ -302,8 +305,7 @@ def _keys(fits: _Fits, eases: Mapping[float, Ease], words: Mapping[float, Ease],
 
     Args:
         fits: Tells whether a value is right: for the two keys' frames, a frame between them, and the share 0 to 1 of
-            the
-        way between the keys' values.
+            the way between the keys' values.
         eases: The eases of the effect's own keys, by frame.
         words: Frames that have to be keys, with the eases that they must have.
         shown: As for `with_keys`.
@@ -346,5 +348,5 @@ def _short_degrees(degrees: float) -> float:
 
 
 def _frame(frame: float, shown: range) -> float:
-    """Return the number of a timeline frame in the recipe, exact in decimals: 31.1 − 30 = 1.1."""
+    """Return the number that a timeline frame has in the recipe, by decimal arithmetic: 31.1 − 30 is exactly 1.1."""
     return float(Decimal(str(np.float32(frame))) - (shown.start - 1))

@@ -265,7 +265,7 @@ def _converter() -> Converter:
 
     Raises:
         RecipeError: cattrs is missing. Blender brings it, but a Linux distribution's Blender may not. Effects render
-        without it.
+            without it.
     """
     try:
         import cattrs
