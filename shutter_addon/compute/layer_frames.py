@@ -1,8 +1,8 @@
 """Frames for the windows of layers, and the mattes by which they are weighted pixel by pixel.
 
-A layer's window has frames times the layer's matte, in the subject's own colors. One more window has frames times what
-all mattes leave: the background, in its own colors. Where no exposed frame shows the background, a plate is made: from
-other frames, or filled from around. Mattes are made once for each source frame, and cached.
+A layer's window has frames times the layer's matte. One more window has the background: frames times what all mattes
+leave. At edges, both get colors of their own (*Clean Edges*). Where no exposed frame shows the background, a plate is
+made: from other frames, or filled from around. Mattes are made once for each source frame, and cached.
 """
 
 from collections.abc import Callable, Hashable, Iterable

@@ -54,7 +54,7 @@ class LayeredRenderer:
         self._layers: Layers | None = None
         self._windows: dict[tuple, Handle] = {}
         self._loaded: dict[tuple[int, int], tuple] = {}  # keys of frames (f, f), and camera motions (f, g)
-        self._crowd = 1  # the factor of the room that windows leave for one another
+        self._crowd = 1  # a factor of the memory that each window reserves, to leave room for others
 
     @property
     def held(self) -> Collection[int]:

@@ -151,7 +151,7 @@ class Renderer:
         return self._layering().draw(request, exposing, coefficients, shot, lambda: self._plain(behind))
 
     def _layering(self) -> LayeredRenderer:
-        """Return what composes pictures with layers. It is made for the first one."""
+        """Return the LayeredRenderer, which composes pictures with layers. It is made when it is first needed."""
         if self._layered is None:
             mattes = self._mattes and self._mattes.another()
             self._layered = LayeredRenderer(

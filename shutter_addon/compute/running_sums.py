@@ -74,7 +74,7 @@ def _by_level(moment: Moment, part: Part, given: Given) -> Iterator[tuple[int, t
 
 
 class Sums(Window):
-    """A window of running sums of opaque 8-bit frames, in the light that is summed (Options.light).
+    """A window of running sums of opaque 8-bit frames: the light of successive frames is the difference of two sums.
 
     Textures are rgba16ui: three fields of 21 bits for each pixel. Layer p mod `layers` holds the sum at position p, for
     the positions from `start` to `stop`, both included: the light of all frames before p, counted from an arbitrary
@@ -86,7 +86,7 @@ class Sums(Window):
 
     Attributes:
         start, stop: The positions of the first and the last sum.
-        whole: The value of white in a field.
+        whole: The value of white in a field, in the light that is summed (Options.light).
         tiled: Whether pixels are stored tile by tile, in TILE.
     """
 

@@ -15,7 +15,7 @@ class LastValue(Generic[T]):
     """A cache of one value. It is made again when its key changes.
 
     Attributes:
-        made: How many values have been made. Other caches use it as the key of a value whose own key is not enough.
+        made: How many values have been made, which tells apart values with equal keys.
     """
 
     def __init__(self) -> None:

@@ -72,11 +72,11 @@ def sentence(text: object, longest: int = LONGEST) -> str:
 
 
 def of_file(error: OSError, place: str | os.PathLike[str] = "") -> str:
-    """Return the system's message about a file, after the file's name.
+    """Return the system's message about a file, as "name: reason".
 
     Args:
         error: The error.
-        place: The name, if the error has none.
+        place: The file's name, if the error has none.
     """
     return f"{os.fsdecode(error.filename or place)}: {error.strerror or error}"
 

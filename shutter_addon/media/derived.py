@@ -1,7 +1,8 @@
-"""Files that are made from footage and kept beside it: mattes of outlines, and vectors of optical flow.
+"""Files that are made from footage and kept: mattes of outlines, and vectors of optical flow.
 
-In their folders, only files with names of ours are opened or removed, and links are never followed. The name of a file,
-or of its folder, has a hash of everything that the file is made from. So after a change, another file is used.
+In their folders, only files with the extension's own names are opened or removed, and links are never followed. The
+name of a file, or of its folder, has a hash of everything that the file is made from. So after a change, another file
+is used.
 """
 
 from __future__ import annotations
@@ -106,7 +107,7 @@ def size_of(path: Path) -> int | None:
 
 
 def opened(path: Path, spec: ImageSpec) -> ImageInput | None:
-    """Open a picture file of ours, but only if it is exactly as expected.
+    """Open a picture file that the extension has written, but only if it is exactly as expected.
 
     Args:
         path: The file.
@@ -131,7 +132,7 @@ def opened(path: Path, spec: ImageSpec) -> ImageInput | None:
 
 
 def read(path: Path, spec: ImageSpec, description: str = "") -> np.ndarray | None:
-    """Return the samples of a picture file of ours.
+    """Return the samples of a picture file that the extension has written.
 
     Args:
         path: The file.
@@ -153,7 +154,7 @@ def read(path: Path, spec: ImageSpec, description: str = "") -> np.ndarray | Non
 
 
 def own_folder(path: Path) -> None:
-    """Make a folder for files of ours if it is missing. The folder that it lies in may be a link to another disk.
+    """Make a folder for files of the extension if it is missing. The folder around it may be a link to another disk.
 
     Raises:
         OSError: It cannot be made, or it is a link itself.
@@ -194,7 +195,7 @@ class StoredVectors:
         return values
 
     def _kept(self, path: Path, shape: tuple[int, ...]) -> np.ndarray | None:
-        """Return the stored vectors for pictures of a shape, or None if the file is missing, damaged or not ours."""
+        """Return the stored vectors for pictures of a shape, or None if the file is missing, damaged or another one."""
         height, width = (-(-n // STEP) for n in shape)
         spec = ImageSpec(width, height, len(_CHANNELS), "half")
         spec.channelnames = _CHANNELS

@@ -1,4 +1,4 @@
-"""Checks of media files, their names and sizes, for movies and image sequences."""
+"""Checks of media files, their names and sizes, for movies and image sequences, and whether PyAV is there."""
 
 import os
 from functools import cache

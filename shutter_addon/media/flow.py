@@ -31,7 +31,7 @@ SHARED = 0.5  # the share of vectors, in each direction, that have to be good
 # Where nothing moves farther than STILL between two frames, in 1 / UNIT of a pixel, moments are mixes of both frames.
 # Up to MOVES, one key moment lies between them; each doubling of the distance doubles the key moments.
 STILL, MOVES = UNIT // 8, 2 * UNIT
-_KEPT = 4  # key moments, and sets of vectors
+_KEPT = 4  # cached key moments, and cached sets of vectors
 VERSION = 2  # raise it when `found` gives something else of the same pictures
 
 
@@ -228,11 +228,11 @@ def _dis(first: np.ndarray, second: np.ndarray, stride: int, smoothness: float =
     height, width = first.shape
     beyond = max(SMALLEST - height, 0), max(SMALLEST - width, 0)
     wide = (cv2.copyMakeBorder(each, 0, beyond[0], 0, beyond[1], cv2.BORDER_REPLICATE) for each in (first, second))
-    # Of pictures without any structure they may be infinite.
+    # Vectors of pictures without any structure may be infinite.
     return np.nan_to_num(dis.calc(*wide, None)[:height, :width], posinf=0, neginf=0)
 
 
-# The dearest first: places and vectors (2, n), x and y in cells of STEP pixels, and costs (n,)
+# Vectors by cost, the highest first: places and vectors (2, n), x and y in cells of STEP pixels, and costs (n,).
 _Carriers = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
@@ -300,12 +300,13 @@ def _carry(
     """
     h, w = (-(-n // STEP) for n in shape)
     stopping.check()
-    # A margin of two takes what leaves the picture. Of whole numbers that are not negative, conversion is `floor`.
+    # What leaves the picture goes into a margin of two cells. For numbers that are not negative, conversion is `floor`.
     x, y = (
         (place + np.float32(t) * vector).clip(0, end).astype(np.int32)
         for place, vector, end in zip(places, vectors, (w + 2, h + 2), strict=True)
     )
-    # Of several that arrive the cheapest stays, the last; where nothing arrives, it is what is put first.
+    # Costs descend, so where several arrive, the last assignment is the cheapest. Where none arrives, the first vector
+    # stays, whose cost is infinite.
     last = np.zeros((h + 4) * (w + 4), np.int32)
     last[y * (w + 4) + x] = np.arange(len(costs), dtype=np.int32)
     last = last.reshape(h + 4, w + 4)[1:-2, 1:-2]
@@ -324,7 +325,7 @@ def _carriers(side: np.ndarray) -> _Carriers:
     # As whole numbers, which NumPy sorts ten times as fast; costs are not negative.
     order = np.argsort(~cost.view(np.uint16), kind="stable")
     row, column = np.divmod(order, side.shape[1])
-    # Of pixels of half the size, whose middle lies half a pixel further.
+    # The flow was found at half the size, where the middle of a pixel is half a pixel further.
     places = np.stack([column, row]).astype(np.float32) + np.float32(2 + 0.5 / STEP)
     x, y, cost = (each.ravel()[order].astype(np.float32) for each in np.moveaxis(side, 2, 0))
     vectors = np.stack([x, y]) / np.float32(STEP)
@@ -432,7 +433,7 @@ def _encoded(frame: np.ndarray, transfer: str, alpha: str) -> np.ndarray:
         return np.ascontiguousarray(frame[..., :3])
     white = np.iinfo(frame.dtype).max if frame.dtype.kind == "u" else 1
     rgba = frame.astype(np.float32) / np.float32(white)
-    # One infinite sample would make NaN of all that interpolation takes it into.
+    # Interpolation would turn everything around an infinite sample into NaN.
     rgba = np.nan_to_num(rgba, copy=False, nan=0, posinf=HALF_MAX, neginf=-HALF_MAX)
     convert = light.to_encoded if transfer == "linear" else None
     if alpha == "opaque":
@@ -485,5 +486,5 @@ def _decoded(frame: np.ndarray, dtype: np.dtype, transfer: str, alpha: str) -> n
     if dtype.kind == "u":
         white = np.iinfo(dtype).max
         return np.rint(np.clip(frame, 0, 1) * np.float32(white)).astype(dtype)
-    limits = np.finfo(dtype)  # which interpolation may pass
+    limits = np.finfo(dtype)  # interpolation can exceed them
     return np.clip(frame, limits.min, limits.max).astype(dtype)

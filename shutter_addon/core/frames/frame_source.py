@@ -27,12 +27,14 @@ _MATRICES = {1: (117489, 138438, 13975, 34925), 2: _BT601, 5: _BT601, 6: _BT601}
 
 @dataclass(frozen=True)
 class Matrix:
-    """The whole numbers with which luma and chroma samples of 8 bits are converted to RGB, as in libswscale.
+    """The whole numbers with which 8-bit samples of luma and chroma are converted to RGB, as in libswscale.
+
+    Factors are in units of 1/8192.
 
     Attributes:
         offset: What is subtracted from luma, in 1/512 of a level.
         luma: The factor of luma for all three colors.
-        red_of_cr, green_of_cb, green_of_cr, blue_of_cb: Factors of chroma.
+        red_of_cr, green_of_cb, green_of_cr, blue_of_cb: The factors of chroma (less 128), which are added.
     """
 
     offset: int

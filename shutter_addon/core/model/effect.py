@@ -178,7 +178,7 @@ class MatteRegion(AnyRegion):
     ).number(default=0.0, most=limits.MAX_DISTANCE, soft_most=0.2, precision=3, context=CONTEXT, recipe="width")
 
     def at(self, frame: float) -> mattes.Matte:
-        """Return the matte at a frame."""
+        """Return the region's matte at a frame."""
         opacity, feather = (float(channel.at(frame)) for channel in (self.opacity, self.feather))
         return mattes.Matte(self.shutter, self.content.at(frame), self.blend, opacity, feather, self.invert)
 
@@ -273,7 +273,7 @@ class FileContent:
 
 @dataclass(frozen=True)
 class RampContent:
-    """A ramp as a recipe names it, before it becomes a channel of mattes.Content."""
+    """A ramp (a gradient) as a recipe names it, before it becomes a channel of mattes.Content."""
 
     ramp: Literal["linear", "radial", "angle", "luminance"] = Labelled("Ramp", "Shape of the ramp").choice(
         RAMPS, default="linear", absent=MISSING
@@ -413,11 +413,12 @@ class Effect:
     """The whole effect, except for its footage.
 
     Attributes:
-        shutters: The first one is the default: it is for all pixels that no region claims.
+        shutters: The first one is the default, which all pixels get if nothing is drawn.
         regions: Later regions lie over earlier ones, and all mattes lie over all scribbles.
         options: Channel of frame_state.Options. Its `edge_aware` does not count: that has a channel here.
         time: Channel of (source frame, whether the footage runs backward); its first frame is 1. None: the strip's own
             timing counts.
+        edge_aware: Channel of Options.edge_aware.
         camera: A subject that shutters can follow.
         lost: A warning that this recipe of an older version cannot look as it did, or None.
     """

@@ -194,9 +194,9 @@ def _offset(
 
 
 def _widths(spline: MaskSpline, weights: np.ndarray, segment: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """Return the feather's width (n,) in mask space at places `u` (n,) of segments (n,).
+    """Return the feather's width (n,) in mask space at places `u` (n,), 0 to 1, of segments (n,).
 
-    It is eased or linear between the spline's points and feather points.
+    Between the spline's points and feather points it is interpolated, eased or linearly.
     """
     result = np.empty(len(u))
     for index, feather in enumerate(spline.feathers):

@@ -70,7 +70,7 @@ class FileFrames:
         offset: The number of frames that the matte plays ahead.
         first: The timeline frame that shows the file's frame `offset`; the file then plays along the timeline. None: it
             follows the footage.
-        timing: The timing of a strip that shows the file. The others then do not count.
+        timing: The timing of a strip that shows the file. `offset` and `first` then do not count.
     """
 
     file: SourceFile

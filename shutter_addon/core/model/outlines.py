@@ -128,7 +128,7 @@ def in_order(drawings: Iterable[Curves], aspect: float) -> list[Curves]:
     """Reorder the curves and points of drawings, so that similar curves of successive drawings can be interpolated.
 
     Strokes are paired by their position in a drawing (scribbles.between_strokes), and their points by theirs. Similar
-    curves get the same position where possible. All curves get as many points, counter-clockwise from similar places
+    curves get the same position where possible. All curves get _POINTS points, counter-clockwise, from similar places
     on.
 
     Args:

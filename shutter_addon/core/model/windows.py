@@ -15,7 +15,7 @@ from .frame_state import FrameState, Options
 
 
 def positions(options: Options, index: int, direction: int = 1) -> np.ndarray:
-    """Return the positions (L,) of the window's frames, in the window's order.
+    """Return the positions (L,) of the frames that can be exposed when a frame is shown, in the window's order.
 
     A filmed frame lasts until the next one. So if the footage plays backward, the moments after it come first, and the
     filmed frame last.
@@ -98,7 +98,7 @@ def source_frames(options: Options, positions: np.ndarray, shot: range) -> np.nd
 
 
 def indices(options: Options, index: int, shot: range, direction: int = 1) -> np.ndarray:
-    """Return the source frames (L,) of the window; −1 for those that are left out.
+    """Return the source frames (L,) that can be exposed when a frame is shown; −1 for those that are left out.
 
     Args:
         options: Of the state.

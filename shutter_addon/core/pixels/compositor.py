@@ -171,7 +171,12 @@ Moves = tuple[np.ndarray, np.ndarray]
 
 
 def mixed_shutter(state: FrameState, coefficients: ArrayLike) -> np.ndarray:
-    """Return the bars (…, L) of the mixed shutter that exposes pixels with coefficients (…, N), whose sum is 1."""
+    """Return the bars (…, L) of the shutter that a pixel has as a mix of all shutters.
+
+    Args:
+        state: The effect at a frame, with N shutters.
+        coefficients: How much of each shutter pixels get, (…, N); the sum is 1.
+    """
     mixed, c = shutters.INTERPOLATIONS[state.options.interpolation], np.asarray(coefficients, dtype=np.float64)
     total = np.zeros((*c.shape[:-1], state.bars.shape[1]))
     for chosen, share, own in ways(state, np.moveaxis(c, -1, 0)):
@@ -313,7 +318,10 @@ def _motions(state: FrameState, coefficients: np.ndarray, moves: Moves | None) -
 
 
 def _exposed(state: FrameState, coefficients: np.ndarray, present: np.ndarray, moves: Moves | None) -> np.ndarray:
-    """Return the weights (M, H, W, L) with which frames are summed, as seen by each of the M `_motions`."""
+    """Return the weights (M, H, W, L) with which frames are summed, for each of the M motions by which pixels see them.
+
+    Arguments as for `compose`.
+    """
     normalised = state.bars / state.bars.sum(axis=1, keepdims=True)
     if moves is not None and state.options.interpolation == "value":
         return _without_absent(coefficients[..., None] * normalised[:, None, None], coefficients, present)
