@@ -67,8 +67,8 @@ def with_keys(effect: Effect, shown: range, contents: Iterable[FileContent | Ram
     names: list[str] = []
     for shutter in effect.shutters:
         names.append(_free(shutter.name, names))  # regions refer to the first of repeated names
-    called, words = _region_names(effect), iter(contents)
-    made = [_region(region, name, words, shown) for region, name in zip(effect.regions, called, strict=True)]
+    called, given = _region_names(effect), iter(contents)
+    made = [_region(region, name, given, shown) for region, name in zip(effect.regions, called, strict=True)]
     camera = Camera(moves=_moves(effect.camera, {}, shown), **_said(effect.camera, shown))
     # Without strokes, a region does not move anything.
     followed = {id(old): new for old, new in zip(effect.regions, made, strict=True)} | {id(effect.camera): camera}
@@ -238,30 +238,30 @@ def _region(
     drawn = marks["outlines" if is_subject else "drawings"]
     if not (marks["drawings"] or drawn):
         return None
-    words: dict[float, Ease] = {}
+    fixed: dict[float, Ease] = {}
     if is_subject and region.moves.are_keyed:
-        words = dict.fromkeys(drawn, "linear")
+        fixed = dict.fromkeys(drawn, "linear")
     elif len(drawn) > 1 and not is_subject:
         # A drawing's ease to the next is independent of the region's keys.
         eases = dict(zip(region.drawings.frames, region.drawings.eases, strict=True))
-        words = {number: eases[number] for number in drawn}
+        fixed = {number: eases[number] for number in drawn}
     for each, drawings in marks.items():
         kept = {number: strokes for number, strokes in drawings.items() if strokes or not is_subject}
-        frames, eased = (_frame(number, shown) for number in kept), (words.get(number, "linear") for number in kept)
+        frames, eased = (_frame(number, shown) for number in kept), (fixed.get(number, "linear") for number in kept)
         said[each] = Drawings(name, tuple(frames), tuple(kept.values()), tuple(eased), 1.0)
-    return replace(region, moves=_moves(region, words, shown), **said)
+    return replace(region, moves=_moves(region, fixed, shown), **said)
 
 
-def _moves(moving: Subject, words: Mapping[float, Ease], shown: range) -> Moves:
+def _moves(moving: Subject, fixed: Mapping[float, Ease], shown: range) -> Moves:
     """Return the placement of a region or camera over time as a recipe has it, with keys.
 
     Args:
         moving: The region or camera.
-        words: As for `_keys`.
+        fixed: As for `_keys`.
         shown: As for `with_keys`.
     """
     keys = []
-    for frame, ease in _move_keys(moving, words, shown):
+    for frame, ease in _move_keys(moving, fixed, shown):
         there = moving.placement(frame)
         x, y = map(_short, there.location)
         placed = Placement((x, y), _short_degrees(there.rotation), _short(there.scale))
@@ -269,7 +269,7 @@ def _moves(moving: Subject, words: Mapping[float, Ease], shown: range) -> Moves:
     return Moves.keyed(keys)
 
 
-def _move_keys(moving: Subject, words: Mapping[float, Ease], shown: range) -> _Eased:
+def _move_keys(moving: Subject, fixed: Mapping[float, Ease], shown: range) -> _Eased:
     """Return the frames and eases of the keys of `_moves`, which has the same arguments."""
     moves = moving.moves.location, moving.moves.rotation, moving.moves.scale
     eases: dict[float, Ease] = {}
@@ -281,10 +281,10 @@ def _move_keys(moving: Subject, words: Mapping[float, Ease], shown: range) -> _E
     def place(frame: float) -> np.ndarray:
         return motions.as_array([moving.placement(frame)])[0]
 
-    if not (eases or words) and tuple(place(shown.start)) != (0, 0, 0, 1):
+    if not (eases or fixed) and tuple(place(shown.start)) != (0, 0, 0, 1):
         eases = {shown.start: "linear"}
     fits = _straight(place, lambda largest: TOLERANCE * np.maximum(1, largest))
-    return _keys(fits, eases, words, shown) if eases or words or sampled else []
+    return _keys(fits, eases, fixed, shown) if eases or fixed or sampled else []
 
 
 def _drawings(drawings: Drawings, frame: float) -> dict[float, list[np.ndarray]]:
@@ -300,17 +300,17 @@ def _drawings(drawings: Drawings, frame: float) -> dict[float, list[np.ndarray]]
     return result
 
 
-def _keys(fits: _Fits, eases: Mapping[float, Ease], words: Mapping[float, Ease], shown: range) -> _Eased:
+def _keys(fits: _Fits, eases: Mapping[float, Ease], fixed: Mapping[float, Ease], shown: range) -> _Eased:
     """Return frames and eases of keys that give the effect's values at every whole frame of the strip.
 
     Args:
         fits: Tells whether a value is right: for the two keys' frames, a frame between them, and the share 0 to 1 of
             the way between the keys' values.
         eases: The eases of the effect's own keys, by frame.
-        words: Frames that have to be keys, with the eases that they must have.
+        fixed: Frames that have to be keys, such as those of drawings, with the eases that they must have.
         shown: As for `with_keys`.
     """
-    if not (frames := sorted(eases.keys() | words.keys())):
+    if not (frames := sorted(eases.keys() | fixed.keys())):
         return [(frame, "linear") for frame in shown]
 
     def per_frame(outside: range, held: float) -> list[tuple[float, Ease]]:
@@ -322,7 +322,7 @@ def _keys(fits: _Fits, eases: Mapping[float, Ease], words: Mapping[float, Ease],
         # Keys may lie a million frames outside the strip.
         between = range(max(math.floor(first) + 1, shown.start), min(math.ceil(second), shown.stop))
         shares = {frame: (frame - first) / (second - first) for frame in between}
-        candidates = (words[first],) if first in words else (eases.get(first, "linear"), *keyframes.EASES)
+        candidates = (fixed[first],) if first in fixed else (eases.get(first, "linear"), *keyframes.EASES)
         for word in candidates:
             if all(fits(first, second, frame, keyframes.eased(share, word)) for frame, share in shares.items()):
                 kept.append((first, word))
@@ -331,7 +331,7 @@ def _keys(fits: _Fits, eases: Mapping[float, Ease], words: Mapping[float, Ease],
             kept.append((first, candidates[0]))
             kept += [(frame, "linear") for frame in shares]
     last = frames[-1]
-    kept.append((last, words.get(last) or eases.get(last, "linear")))
+    kept.append((last, fixed.get(last) or eases.get(last, "linear")))
     return kept + per_frame(range(max(math.floor(last) + 1, shown.start), shown.stop), last)
 
 
