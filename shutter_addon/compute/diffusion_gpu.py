@@ -316,7 +316,7 @@ class Diffusion:
             self._run(self._pass(grid, "smooth"), grid, "near", cells, grid.layers, values=values, colour=colour)
 
     def _pass(self, grid: _Grid, name: str) -> Pass:
-        """Return the pass of `operators` with this name for a grid."""
+        """Return the pass of `operators` with a name, for the way in which a grid's cells are coupled."""
         return self.finest[name] if grid.finest else _COARSER[name]
 
     def _finish(self) -> None:

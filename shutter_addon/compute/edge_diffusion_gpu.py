@@ -115,9 +115,9 @@ class EdgeDiffusion(Diffusion):
             finest.textures["links"] = self._device.texture(*finest.size, 1, "rgba32f")
 
     def _correct(self, index: int) -> None:
-        """Improve the solution of the grid with a number (Diffusion._correct).
+        """Improve the solution of the grid with a number, which then corrects the next finer one.
 
-        Cycles near scribbles go down to the grid of the conjugate gradients, and not further.
+        Conjugate gradients improve it on their grid, and a cycle does on finer grids.
         """
         if index == self._solved:
             self._conjugate_gradients(self._grids[index], self._iterations)

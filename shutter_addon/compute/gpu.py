@@ -348,7 +348,10 @@ class GPUCompositor:
         return window.picture(levels=True) if request.levels else window.mixed()
 
     def _selected(self, handle: Texture, chosen: tuple[int, ...], count: int) -> tuple[Texture, Texture]:
-        """Return how much of some shutters a pixel gets, scaled to a sum of 1, and that sum, until the next call.
+        """Return textures of how much of the chosen shutters each pixel gets, relative to each other and in sum.
+
+        The first has their coefficients scaled to a sum of 1, the second that sum before. Both are valid until the next
+        call.
 
         Args:
             handle: The coefficients of all shutters.

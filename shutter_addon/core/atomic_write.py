@@ -1,6 +1,6 @@
-"""Write files whole or not at all: into a temporary folder beside their place, from which they are moved.
+"""Write files whole or not at all: into a temporary folder beside their place, from which they are then moved.
 
-Such a folder is called a part folder.
+This module calls such a folder a part folder.
 """
 
 import math

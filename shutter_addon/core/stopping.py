@@ -18,7 +18,7 @@ class StoppedError(Exception):
 
 
 def never() -> bool:
-    """Return False: work that is never cancelled."""
+    """Return False. As `stopped` of `once`, it never cancels work."""
     return False
 
 

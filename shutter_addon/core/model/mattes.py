@@ -50,9 +50,6 @@ class FileFrame:
         Args:
             source: The opened file.
             shown: The filmed frame of the footage that is shown, from 0.
-
-        Raises:
-            EffectError: The strip's retiming is unknown.
         """
         if self.time is None:
             return shown + self.offset
@@ -168,7 +165,7 @@ class MatteReader(Protocol):
             (key, values) for each matte: (h, w) float32, 0 to 1, without the opacity.
 
         Raises:
-            UserError: A file cannot be read, or lacks a frame.
+            UserError: A file cannot be read.
         """
 
     def another(self) -> MatteReader:

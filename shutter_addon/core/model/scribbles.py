@@ -253,7 +253,7 @@ def _draw(labels: np.ndarray, points: np.ndarray, radius: float, label: int) -> 
 
 
 def _seen(starts: np.ndarray, steps: np.ndarray, size: np.ndarray, reach: float) -> np.ndarray:
-    """Return the parts of segments that are near a picture: shares (2, n), 0 to 1, of each segment's start and end.
+    """Return between which shares of its length, 0 to 1, each segment is near a picture, (2, n).
 
     Args:
         starts, steps: (n, 2), the segments' starts, and the way to their ends, in pixels.

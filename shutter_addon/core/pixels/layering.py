@@ -38,7 +38,7 @@ _CELLS = 4
 
 
 def matte_of(coefficients: ArrayLike) -> np.ndarray:
-    """Return the matte (…), 0 to 1, of a layer of strokes from its diffused coefficients (…)."""
+    """Return the matte (…), 0 to 1, of a layer of strokes from the coefficients (…) that are diffused from these."""
     values = (np.asarray(coefficients) - NONE) / (WHOLE - NONE)
     return np.clip(values, 0, 1)
 
