@@ -271,7 +271,7 @@ class Sums(Window):
             yield frame
 
     def _filmed(self, moment: Moment) -> tuple[Texture, int]:
-        """Return the two frames of a moment on the device, and the layer of the first.
+        """Return the two filmed frames that a moment is made from, on the device, and the layer of the first.
 
         Both stay for all moments of their pair, and one of them for the next pair.
         """

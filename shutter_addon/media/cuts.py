@@ -115,30 +115,30 @@ def is_cut(before: list[Signature], after: list[Signature]) -> bool:
 
 
 def may_be_cut(before: Signature, after: Signature) -> bool:
-    """Return whether two successive frames, by their signatures, differ enough for a cut between them.
+    """Return whether two successive frames differ enough for a cut between them, by their signatures.
 
-    It is a quick test: `is_cut` also needs the frames around them.
+    It is a quick test. `is_cut` also needs the frames around them.
     """
     return _differ(before, after, NOISE) and _unlike(before, after) >= APART
 
 
 def _parts(picture: Signature) -> list[Signature]:
-    """Return the PARTS × PARTS parts of a signature."""
+    """Return the PARTS × PARTS parts of a frame's small picture."""
     split = (np.array_split(rows, PARTS, axis=1) for rows in np.array_split(picture, PARTS))
     return [part for parts in split for part in parts if part.size]
 
 
 def _shared(picture: Signature, down: int, right: int) -> Signature:
-    """Return the part of a signature that is also in another one's picture if the camera jumped by some blocks."""
+    """Return the part of a frame's small picture that another one also shows if the camera jumped by some blocks."""
     height, width = picture.shape[:2]
     return picture[max(down, 0) : height + min(down, 0), max(right, 0) : width + min(right, 0)]
 
 
 def _differ(before: Signature, after: Signature, least: float, share: float = 1.0) -> bool:
-    """Return whether brightness changes enough between two signatures, or parts of them.
+    """Return whether brightness changes enough between the small pictures of two frames, or between parts of them.
 
     Args:
-        before, after: The signatures.
+        before, after: The pictures.
         least: The least change in levels of 255.
         share: The least share of the change that a cut makes, which is less in dark pictures.
     """
@@ -160,7 +160,7 @@ def _stands_out(before: list[Signature], after: list[Signature]) -> bool:
 
 
 def _moving(pictures: list[Signature]) -> list[Signature]:
-    """Return those of successive signatures that do not repeat the last one."""
+    """Return those of successive frames' small pictures that do not repeat the last one."""
     kept = pictures[:1]
     for picture in pictures[1:]:
         if np.abs(kept[-1] - picture).max() > REPEATED:
@@ -173,7 +173,7 @@ def _moving(pictures: list[Signature]) -> list[Signature]:
 
 
 def _change(before: np.ndarray, after: np.ndarray) -> float:
-    """Return the mean change of brightness (the largest color) between two signatures in levels.
+    """Return the mean change of brightness (the largest color) between small pictures of two frames, in levels.
 
     This is the score of PySceneDetect's ContentDetector for luma.
     """
@@ -181,12 +181,12 @@ def _change(before: np.ndarray, after: np.ndarray) -> float:
 
 
 def _unlike(before: np.ndarray, after: np.ndarray) -> float:
-    """Return the share, 0 to 1, of the bits of two signatures' hashes that differ, as HashDetector does."""
+    """Return the share, 0 to 1, of bits in which the hashes of two frames' small pictures differ (HashDetector)."""
     return np.count_nonzero(_hash(before) != _hash(after)) / BITS**2
 
 
 def _whole(picture: np.ndarray) -> np.ndarray:
-    """Return a signature rounded to uint8."""
+    """Return a frame's small picture rounded to uint8."""
     return np.rint(picture).clip(0, 255).astype(np.uint8)
 
 
@@ -326,7 +326,7 @@ class ShotSource(SourceWrapper):
         return is_cut(before, after), len(before) + len(after) == len(beside)
 
     def _signature(self, index: int) -> Signature | None:
-        """Return the signature of a filmed frame, or None if the frame cannot be read.
+        """Return the signature (the small picture) of a filmed frame, or None if the frame cannot be read.
 
         The error is not lost: reading the frame itself raises it again.
         """
@@ -345,5 +345,5 @@ class ShotSource(SourceWrapper):
 
 
 def _known(signatures: Iterable[Signature | None]) -> list[Signature]:
-    """Return the signatures before the first one that is None."""
+    """Return the signatures (small pictures) before the first one that is None, whose frame could not be read."""
     return [each for each in takewhile(lambda each: each is not None, signatures) if each is not None]

@@ -79,8 +79,9 @@ def _filmed(span: tuple[int, int], options: Options) -> tuple[int, int]:
 def source_frames(options: Options, positions: np.ndarray, shot: range) -> np.ndarray:
     """Return the source frame that a window shows at each of its positions; −1 for none.
 
-    Beyond the shot's ends, "hold" and "slide" repeat the last frame, and "mirror" plays back from it without repeating
-    it. "shorten" leaves frames out. If that leaves none, it repeats the last frame, too.
+    Beyond the shot's ends, "hold" and "slide" repeat its first or last frame, and "mirror" plays back from there
+    without repeating it. "shorten" leaves frames out, unless all are beyond: then it repeats the first or last frame,
+    too.
 
     Args:
         options: Of the state.

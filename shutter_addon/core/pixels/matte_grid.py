@@ -76,7 +76,13 @@ def block_sums(
 
 
 def _resampled(values: np.ndarray, down: Taps, across: Taps) -> np.ndarray:
-    """Return values (h, w) resampled by taps for the rows (`down`) and for the columns (`across`)."""
+    """Return values (h, w) resampled along rows and columns.
+
+    Args:
+        values: The values.
+        down: The taps that make the new rows.
+        across: The taps that make the new columns.
+    """
     if len(across[0]) > values.shape[1]:  # transpose while it is small
         return _weighted(_turned(_weighted(_turned(values), *across)), *down)
     return _turned(_weighted(_turned(_weighted(values, *down)), *across))
@@ -138,7 +144,7 @@ def _convolved(values: np.ndarray, kernel: np.ndarray) -> np.ndarray:
 
 
 def _fit(length: int, size: int, scale: float) -> Taps:
-    """Return the taps that resample an axis for `fitted`.
+    """Return the taps (which pixels are summed for each new one, and their weights) of an axis for `fitted`.
 
     Args:
         length: The matte's pixels along the axis.
@@ -162,7 +168,10 @@ def _fit(length: int, size: int, scale: float) -> Taps:
 
 
 def _blocks(length: int, block: int) -> Taps:
-    """Return the taps for means of blocks of `block` rows; the last block may be smaller."""
+    """Return the taps (which rows are summed, and their weights) for means of blocks of rows.
+
+    The last block may be smaller.
+    """
     indices = np.arange(0, length, block)[:, None] + np.arange(block)
     present = indices < length
     return indices.clip(0, length - 1), present / present.sum(axis=1, keepdims=True)
@@ -182,14 +191,20 @@ def _gaussian(sigma: float) -> np.ndarray:
 
 
 def _means(length: int, step: int) -> Taps:
-    """Return the taps for means of cells of `step` pixels. One more cell at each end repeats the last pixel."""
+    """Return the taps (which pixels are summed, and their weights) for means of cells of `step` pixels.
+
+    One more cell at each end repeats the last pixel.
+    """
     cells = np.arange(-1, math.ceil(length / step) + 1)[:, None]
     indices = (cells * step + np.arange(step)).clip(0, length - 1)
     return indices, np.full(indices.shape, 1 / step)
 
 
 def _lines(length: int, step: int) -> Taps:
-    """Return the taps for `length` pixels, interpolated linearly between the middles of the cells of `_means`."""
+    """Return the taps (which cells are summed, and their weights) for `length` pixels.
+
+    They interpolate linearly between the middles of the cells of `_means`.
+    """
     place = (np.arange(length)[:, None] + 0.5) / step + 0.5
     indices = np.floor(place).astype(int) + np.arange(2)
     return indices, 1 - np.abs(place - indices)
