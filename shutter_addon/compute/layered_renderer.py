@@ -187,13 +187,16 @@ class LayeredRenderer:
     def _plate(
         self, request: Request, exposed: list[Exposure], shot: range, gain: Callable[[], np.ndarray]
     ) -> np.ndarray | None:
-        """Return Behind.plate, or None where enough of the background is exposed, or what lacks is hidden by layers.
+        """Return a picture (H, W, 4) of the background for where too little of it is exposed, if it is visible there.
 
         Args:
             request: The picture.
             exposed: The background, and the layers.
             shot: The source frames that windows may show.
             gain: Returns the brightness (H, W) of the background's pixels.
+
+        Returns:
+            Behind.plate; None if it is needed nowhere.
         """
         layers, (bottom, *own) = request.state.layers, exposed
         if layers is None or self._stages.least_share(bottom) >= layering.CLEAR:

@@ -515,7 +515,7 @@ def sole_of(layers: list[LabelLayer]) -> int | None:
 
 
 def _layer(share: float, labels: np.ndarray) -> LabelLayer:
-    """Return the LabelLayer of labels that count with a share."""
+    """Return the LabelLayer of labels (h, w) uint16 that count with a share. Find its only shutter and its key."""
     digest = hashlib.blake2b(np.ascontiguousarray(labels), digest_size=16).digest()
     highest = int(labels.max())
     sole: int | None = 0  # without scribbles, the first shutter holds everywhere

@@ -191,7 +191,11 @@ def _whole(picture: np.ndarray) -> np.ndarray:
 
 
 def _hash(picture: np.ndarray) -> np.ndarray:
-    """Return the hash of a signature, BITS × BITS bool: which of its lowest frequencies are above their median."""
+    """Return the hash of a frame's small picture: which of its low frequencies exceed their median.
+
+    Returns:
+        bool (BITS, BITS), as by PySceneDetect's HashDetector.
+    """
     grey = (_whole(picture) @ _GREY + (1 << 14)) >> 15
     down, right = (_means(length, 2 * BITS) for length in grey.shape)
     small = np.rint(down @ grey @ right.T)  # like OpenCV's INTER_AREA except for rounding

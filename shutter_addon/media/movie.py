@@ -146,7 +146,7 @@ class MovieSource(FrameSource):
 
     @contextmanager
     def _named(self, index: int) -> Iterator[None]:
-        """Raise errors of this context as a MediaError that names the frame."""
+        """Turn errors inside this context into a MediaError that names the frame."""
         try:
             yield
         except (av.error.FFmpegError, MediaError) as error:

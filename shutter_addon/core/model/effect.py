@@ -359,6 +359,8 @@ class Shutter:
     def spread(self, steps: int, backward: bool = False) -> Callable[[np.ndarray], np.ndarray]:
         """Return a function that turns bars of filmed frames (L,) into bars of moments (L · steps,).
 
+        Moments are filmed frames, and those made between them.
+
         Args:
             steps: Moments per filmed frame.
             backward: Whether the footage plays backward.
@@ -371,6 +373,8 @@ class Shutter:
     def filmed(self, moments: ArrayLike, steps: int, position: str) -> shutters.Filmed:
         """Convert bars of moments, which recipes of version 1 have, into bars of filmed frames.
 
+        Moments are filmed frames, and those made between them.
+
         Args:
             moments: (n,) bars.
             steps: Moments per filmed frame.
@@ -380,6 +384,8 @@ class Shutter:
 
     def lost(self, keys: Sequence[ArrayLike], steps: int, position: str, interpolation: str) -> EffectError | None:
         """Return a warning if bars of filmed frames cannot expose what a recipe of version 1 did with bars of moments.
+
+        Moments are filmed frames, and those made between them.
 
         Args:
             keys: The bars of moments at each key.

@@ -190,7 +190,8 @@ class Bars:
         Args:
             frame: The frame.
             interpolation: Options.interpolation; with "value" bars fade by themselves between keys.
-            spread: Turns bars of filmed frames into bars of moments, so that displacement passes through moments.
+            spread: Turns bars of filmed frames into bars of moments (Shutter.spread), so that displacement passes
+                through these.
         """
         if not self.keys:
             return spread(self.channel.at(frame))

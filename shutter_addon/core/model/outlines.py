@@ -158,7 +158,7 @@ def _differ(curve: np.ndarray, other: np.ndarray) -> float:
 
 
 def _resampled(curve: np.ndarray, aspect: float) -> np.ndarray:
-    """Return a closed curve with _POINTS points at equal distances."""
+    """Return a closed curve (n, 2) as _POINTS points at equal distances along it, (_POINTS, 2)."""
     return scribbles.resample(np.concatenate([curve, curve[:1]]), _POINTS + 1, aspect)[:-1]
 
 

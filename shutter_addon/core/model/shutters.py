@@ -1,8 +1,10 @@
 """Shutters: bars, exposure, accumulation, quantile, and their interpolation (paper §3.1, §3.2, §3.4.1).
 
-A shutter is an array of L bars ≥ 0, one per source frame of the window. Its exposure is e = Σ bars. Its normalised
-accumulation S is piecewise linear on [0, L] and rises from 0 to 1. Its quantile S⁻¹ maps z in [0, 1] to a time in
-[0, L]. Everything here is exact, in float64, and the reference of every device.
+A shutter is an array of L bars ≥ 0, one per source frame of the window: how much that frame contributes. Its exposure
+is e = Σ bars. Its normalised accumulation S is piecewise linear on [0, L] and rises from 0 to 1. Its quantile S⁻¹ maps
+z in [0, 1] to a time in [0, L]. Everything here is exact, in float64, and the reference of every device.
+
+Smooth makes frames between filmed ones. All of these are called moments; bars of filmed frames are spread over them.
 
 Presets make L bars in [0, 1] from a window length and a few parameters.
 """
@@ -221,7 +223,7 @@ def spanning(bars: ArrayLike, start: float, end: float) -> np.ndarray:
 
 
 def smoothed(bars: ArrayLike, steps: int, *, backward: bool = False, level: bool = False) -> np.ndarray:
-    """Spread the bars (L,) of filmed frames over the moments between them.
+    """Spread the bars (L,) of filmed frames over moments, which are filmed frames and those made between them.
 
     The time between two frames is exposed if both of their bars are open: each bar spreads its weight evenly over the
     half intervals towards its open neighbours. A bar without open neighbours exposes only the filmed frame.
@@ -264,7 +266,7 @@ def _open_beside(bars: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def held(bars: ArrayLike, steps: int) -> np.ndarray:
-    """Spread each bar (L,) of a filmed frame evenly over the `steps` moments of that frame.
+    """Spread each bar (L,) of a filmed frame evenly over the `steps` moments (this frame, and those made after it).
 
     Returns:
         Bars of moments (L · steps,) with the same sum.
@@ -273,7 +275,7 @@ def held(bars: ArrayLike, steps: int) -> np.ndarray:
 
 
 class Filmed(NamedTuple):
-    """Bars of filmed frames that replace bars of moments.
+    """Bars of filmed frames that replace bars of moments (filmed frames, and those made between them).
 
     Attributes:
         bars: (L,).
@@ -286,9 +288,10 @@ class Filmed(NamedTuple):
 
 
 def filmed(moments: ArrayLike, steps: int, position: str, spread: Callable[[np.ndarray], np.ndarray]) -> Filmed:
-    """Convert bars of moments, as in recipes of version 1, into bars of filmed frames.
+    """Convert bars of moments (filmed frames, and those made between them) into bars of filmed frames.
 
-    A window that ended within a filmed frame gets all of it: the last one, or the first if `position` is "end".
+    Recipes of version 1 have bars of moments. If the window ends within a filmed frame, that one counts as a whole: the
+    last one, or the first if `position` is "end".
 
     Args:
         moments: (n,).

@@ -69,9 +69,10 @@ def state_at(effect: Effect, clip: Clip, frame: float) -> Moment:
 
 
 def _in_moments(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameState:
-    """Return the state with bars and window in the clip's moments, `clip.step` per filmed frame.
+    """Return the state with bars and window in the clip's moments: filmed frames, and those made between them.
 
-    Bars that are only the shape of an exposure keep that shape: they are spread evenly.
+    There are `clip.step` per filmed frame. Bars that are only the shape of an exposure keep that shape: they are spread
+    evenly.
     """
     options = replace(state.options, window=state.options.window * clip.step, step=clip.step, backward=at.direction < 0)
     if clip.step == 1:

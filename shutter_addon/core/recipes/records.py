@@ -231,7 +231,10 @@ def effect_of(recipe: Any) -> model.Effect:
 
 
 def _filmed(effect: model.Effect, options: Options) -> model.Effect:
-    """Convert an effect from a recipe of version 1, whose bars count moments, to one whose bars count filmed frames."""
+    """Convert an effect from a recipe of version 1, whose bars count moments, to one whose bars count filmed frames.
+
+    Moments are filmed frames, and those made between them.
+    """
     steps, position, lost = int(options.step), options.position, []
     shutters = []
     for shutter in effect.shutters:
