@@ -1,1 +1,4 @@
-"""Virtual Shutter: every pixel its own exposure. Only the package `blender` uses bpy."""
+"""Virtual Shutter, an extension for Blender that gives every pixel its own exposure.
+
+Only folders named `blender`, and __main__.py, import bpy.
+"""

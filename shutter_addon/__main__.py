@@ -1,4 +1,7 @@
-"""`python -m shutter_addon render …` with the bpy wheel; see blender/command.py."""
+"""Run the extension's commands with Blender as a Python library: `python -m shutter_addon render …`.
+
+blender/command.py has the commands. They need the package bpy.
+"""
 
 import os
 import sys
@@ -31,6 +34,7 @@ def main() -> int:
 
 
 def _refuse(sentence: str) -> int:
+    """Print an error message to stderr and return the exit status 2."""
     from .core.messages import signed
 
     print(signed(sentence), file=sys.stderr)
@@ -38,7 +42,10 @@ def _refuse(sentence: str) -> int:
 
 
 def _open_streams() -> None:
-    """Open closed standard streams on the null device, so that no file gets their numbers and Blender's output."""
+    """Open standard streams that are closed on the null device.
+
+    Otherwise the next file that is opened would get a stream's descriptor, and Blender would print into that file.
+    """
     for number in range(3):
         try:
             os.fstat(number)
@@ -50,7 +57,7 @@ def _open_streams() -> None:
 
 
 def _flush() -> None:
-    """Flush stdout. A closed pipe is not an error of the film."""
+    """Flush stdout, and ignore that its reader may have gone: the film is written all the same."""
     try:
         sys.stdout.flush()
     except OSError:

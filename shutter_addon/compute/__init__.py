@@ -1,1 +1,1 @@
-"""Diffusion and composition, on a device or with NumPy. No bpy."""
+"""Pictures: diffusion of strokes, windows of frames, and composition, on a GPU or with NumPy. No bpy."""

@@ -1,4 +1,7 @@
-"""The passes that compose a picture, the choice of the fastest one, and their tables of shutters."""
+"""Which compute pass composes a picture fastest, and the tables of shutters that passes read.
+
+A piece is a stretch on which the quantiles of all shutters are linear (core.model.shutters.knots).
+"""
 
 from functools import lru_cache
 
@@ -24,7 +27,7 @@ _ROWS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
 
 
 def composition(way: str, groups: int, **macros: int | str) -> Pass:
-    """Return the pass compose_<way> from shaders/.
+    """Return a compute pass that composes pictures: compose_<way> of shaders/.
 
     Args:
         way: As from `way_of`.
@@ -37,22 +40,27 @@ def composition(way: str, groups: int, **macros: int | str) -> Pass:
 
 
 def lines_of(way: str, *, is_median: bool) -> int:
-    """Return the rows of pixels that one invocation of a way's pass composes."""
+    """Return how many rows of pixels one invocation of a way's pass composes.
+
+    Args:
+        way: As from `way_of`.
+        is_median: Whether it makes a median of frames.
+    """
     return 4 if is_median else _LINES.get(way, BLOCK)
 
 
 def way_of(window: Window, state: FrameState, values: np.ndarray, shortened: bool) -> str:
-    """Return the fastest way to compose: the name of a pass, without compose_.
+    """Return the fastest way to compose a picture: the name of a pass in shaders/, without compose_.
 
     The limits come from times at 1080p, for 2 to 8 shutters and windows of 16 to 64 frames. With running sums, in
     multiples of a plain average of 16 frames: "sums" takes 0.3 + 0.23 · pieces, "frames" 1 + 0.1 · frames. With frames,
     in multiples of a plain average of the window: "pieces" takes 1.5 + 1.4 · pieces / frames, "frames" 2.1 to 2.8.
 
     Args:
-        window: the window
-        state: the effect
-        values: of `table`: a row of gains, then a row for each piece
-        shortened: whether exposed frames are missing (edges "shorten")
+        window: The window, which holds running sums or frames.
+        state: The effect, with shutters that combine frames in one way.
+        values: The table of shutters, from `table`.
+        shortened: Whether exposed frames are missing (edges "shorten").
     """
     if state.options.interpolation == "value":
         return "value"
@@ -70,14 +78,14 @@ def way_of(window: Window, state: FrameState, values: np.ndarray, shortened: boo
 
 
 def moved_way(state: FrameState, values: np.ndarray, motions: int, mixed: int, quads: int) -> tuple[str, int]:
-    """Return the way to compose where shutters follow something, and the quads of pixels for each invocation.
+    """Return the way to compose a picture whose shutters follow a motion, and the quads of pixels for each invocation.
 
     Args:
-        state: the effect
-        values: of moved_tables, without the rows of motions
-        motions: motions that see each frame
-        mixed: the MIXED of shaders/include/moved.glsl
-        quads: the most quads
+        state: The effect.
+        values: The table of shutters from moved_tables, without the rows of motions.
+        motions: How many motions each frame is seen by.
+        mixed: How many motions a pixel mixes: MIXED of shaders/include/moved.glsl.
+        quads: The most quads.
     """
     span = state.open_span
     frames = span[1] - span[0]
@@ -91,24 +99,26 @@ def moved_way(state: FrameState, values: np.ndarray, motions: int, mixed: int, q
 
 
 def filled_rows(rows: int) -> float:
-    """Return the number of pieces for which compose_sums is compiled, at least `rows`; infinity if there is none."""
+    """Return the smallest number of pieces, at least `rows`, for which the pass compose_sums is compiled.
+
+    It is infinity if there is none.
+    """
     return next((filled for filled in _ROWS if filled >= rows), np.inf)
 
 
 def padded(values: np.ndarray) -> np.ndarray:
-    """Return values (…, N) as (…, G, 4): four shutters to a texel, zeros after the last."""
+    """Return values (…, N) of N shutters as texels (…, G, 4): four shutters to a texel, zeros after the last."""
     whole = np.pad(values, [(0, 0)] * (values.ndim - 1) + [(0, -values.shape[-1] % 4)])
     return whole.reshape(*values.shape[:-1], -1, 4)
 
 
 def table(state: FrameState) -> np.ndarray:
-    """Return the table (1 + rows, columns, 4) float32 of shaders/include/compose.glsl.
+    """Return the table of shutters (1 + rows, columns, 4) float32 that passes read (shaders/include/compose.glsl).
 
     Row 0 has the gains. For lightest and darkest, they scale the highest weight to 1 (core.pixels.compositor); by
-    value, they are the shutters' mean times.
-    By displacement, there is a row for each piece of the quantiles: starts, ends, then dz, the most by which the
-    shutters' times differ at either, and z at its start. By value, there is a row of weights for each frame of the open
-    span.
+    value, they are the shutters' mean times. By displacement, there is a row for each piece of the quantiles: starts,
+    ends, then dz, the most by which the shutters' times differ at either, and z at its start. By value, there is a row
+    of weights for each frame of the open span.
     """
     by_pieces, bars = state.options.interpolation == "displacement", state.bars
     rows = _pieces(bars.tobytes(), bars.dtype, bars.shape) if by_pieces else _bars(state)
@@ -121,7 +131,10 @@ def table(state: FrameState) -> np.ndarray:
 
 @lru_cache(16)
 def _pieces(content: bytes, dtype: np.dtype, shape: tuple[int, ...]) -> np.ndarray:
-    """Return the rows of pieces. They are cached: bars seldom change from frame to frame."""
+    """Return the rows of `table` for the pieces of shutters, whose bars are given as bytes, dtype and shape.
+
+    They are cached, because bars seldom change from frame to frame.
+    """
     knots = shutters.knots(np.frombuffer(content, dtype).reshape(shape))
     start, end = padded(knots.start), padded(knots.end)
     last = np.zeros((len(start), 1, 4))
@@ -132,6 +145,7 @@ def _pieces(content: bytes, dtype: np.dtype, shape: tuple[int, ...]) -> np.ndarr
 
 
 def _gains(state: FrameState) -> np.ndarray:
+    """Return the gains (N,) in row 0 of `table`."""
     (combine,) = state.groups
     if combine.mode not in ("lightest", "darkest"):
         return state.gains
@@ -142,24 +156,25 @@ def _gains(state: FrameState) -> np.ndarray:
 
 
 def _bars(state: FrameState) -> np.ndarray:
-    """Return the weight of each frame of the open span."""
+    """Return the rows of `table` by value: the weight of each frame of the open span, for each shutter."""
     (combine,) = state.groups
     whole = state.bars.max(axis=1) if combine.mode in ("lightest", "darkest") else state.bars.sum(axis=1)
     return padded((state.bars / whole[:, None]).T[slice(*state.open_span)])
 
 
 def moved_tables(state: FrameState, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the table of shutters and that of moves, as in shaders/include/moved.glsl, without the layers of frames.
+    """Return the table of shutters and that of motions for a picture whose shutters follow something.
 
-    By displacement there is one motion, which mixes those of the shutters. By value there is one for all shutters that
-    move alike, and the table has a row for each frame and motion. A row for each motion follows: 1 for its shutters.
+    Passes read them as in shaders/include/moved.glsl; the caller adds the layers of frames. By displacement there is
+    one motion, which mixes those of the shutters. By value there is one for all shutters that move alike, and the table
+    of shutters has a row for each frame and motion. A row for each motion follows: 1 for its shutters.
 
     Args:
-        state: the effect, which follows something
-        frames: the window's source frames (L,), −1 where one is missing
+        state: The effect.
+        frames: The window's source frames (L,), −1 where one is missing.
 
     Returns:
-        The table, and the moves (L · motions, 1 + N, 4) float32; by value (L · motions, 2, 4)
+        The table of shutters, and the motions (L · motions, 1 + N, 4) float32; by value (L · motions, 2, 4).
     """
     assert state.following is not None
     turns, shifts = state.following.at(frames)

@@ -1,4 +1,4 @@
-"""Compositing with NumPy, tile by tile, by the reference itself. It is slow, for machines without a GPU."""
+"""Compose pictures with NumPy, tile by tile, by the reference itself. It is slow, for machines without a GPU."""
 
 from __future__ import annotations
 
@@ -27,7 +27,14 @@ Moves = tuple[np.ndarray, np.ndarray]
 
 
 class HostWindow:
-    """A window of source frames in the host's memory. For `is_open` and `sends`, see window.Window."""
+    """The source frames that a picture exposes, in the host's memory.
+
+    Attributes:
+        is_open, sends: As for window.Window.
+        source: The footage.
+        shot: The source frames that may be shown.
+        frames: The loaded frames (H, W, 4), by index.
+    """
 
     is_open, sends = True, False
 
@@ -37,10 +44,11 @@ class HostWindow:
 
     @property
     def held(self) -> Collection[int]:
+        """The indices of the loaded source frames."""
         return self.frames.keys()
 
     def load(self, positions: np.ndarray, options: Options, shot: range) -> None:
-        """See running_sums.Sums.load."""
+        """Read the frames at some positions that are not loaded, and free all others. Arguments as for Sums.load."""
         self.shot = shot
         wanted = set(windows.source_frames(options, positions, shot).tolist())
         self.frames = {index: frame for index, frame in self.frames.items() if index in wanted}
@@ -48,16 +56,16 @@ class HostWindow:
             self.frames[index] = self.source.read(index)
 
     def seen(self, indices: np.ndarray, tile: Tile, moves: Moves | None) -> tuple[list[np.ndarray], Moves | None]:
-        """Return the parts of frames that a tile shows, for `compositor.compose`.
+        """Return the parts of frames that a tile of the picture shows, for `compositor.compose`.
 
         Args:
             indices: (L,) source frames. One that is not loaded is not exposed, and becomes one black pixel.
-            tile: rows and columns
-            moves: turns and shifts (L, N) of the picture. None: nothing is followed.
+            tile: The tile's rows and columns.
+            moves: Turns and shifts (L, N) of the picture. None: nothing is followed.
 
         Returns:
             Frames (h, w, 4) in linear light, premultiplied: the tile's pixels, or all that a following exposure reads;
-            and the turns and shifts from the tile's pixels to those
+            and the turns and shifts from the tile's pixels to those.
         """
         if moves is None:
             parts, moved = [tile] * len(indices), None
@@ -76,28 +84,31 @@ class HostWindow:
         return frames, moved
 
     def release(self) -> None:
+        """Free the frames."""
         self.frames = {}
 
 
 def _ends(pixels: slice) -> tuple[int, int]:
+    """Return the first and the last pixel of a range."""
     return pixels.start, pixels.stop - 1
 
 
 def _around(places: np.ndarray, source: FrameSource) -> Tile:
-    """Return the pixels that filters read between places x + iy."""
+    """Return the rows and columns that are read when a source's frame is sampled between places x + iy."""
     sides = (places.imag, source.height), (places.real, source.width)
     rows, columns = (np.clip((along.min() - 3, along.max() + 3), 0, size - 1).astype(int) for along, size in sides)
     return slice(rows[0], rows[1] + 1), slice(columns[0], columns[1] + 1)
 
 
 def _tiles(source: FrameSource) -> Iterator[Tile]:
+    """Yield the rows and columns of all tiles of a picture."""
     for top in range(0, source.height, TILE):
         for left in range(0, source.width, TILE):
             yield slice(top, min(top + TILE, source.height)), slice(left, min(left + TILE, source.width))
 
 
 class CPUCompositor:
-    """request.Compositor and request.Stages with NumPy."""
+    """Composes pictures with NumPy. It has the methods of request.Compositor and of request.Stages."""
 
     name = "NumPy"
     takes_planes = False
@@ -161,7 +172,13 @@ class CPUCompositor:
         return self.over_black(picture) if levels else picture
 
     def draw(self, window: HostWindow, request: Request, coefficients: Coefficients) -> np.ndarray:
-        """Return the picture (H, W, 4), top row first: float32, or levels in uint8."""
+        """Return the picture (H, W, 4), top row first: float32 in linear light, or levels in uint8.
+
+        Args:
+            window: The window, which has loaded all exposed frames.
+            request: The picture.
+            coefficients: How much of each shutter a pixel gets.
+        """
         state, source = request.state, window.source
         indices = windows.indices(state.options, request.index, window.shot, request.direction)
         moves = None if state.following is None else state.following.at(indices)

@@ -1,10 +1,10 @@
-"""Diffusion with NumPy: coefficients for every pixel from the scribbles (paper §3.4.2).
+"""Diffusion with NumPy: from scribbles, compute how much of each shutter every pixel gets (paper §3.4.2).
 
-Coefficients are harmonic functions with the scribbles as fixed values and free (Neumann) edges. Conductances keep them
-from spreading across edges of the picture. They are solved for by conjugate gradients, preconditioned with a multigrid
-cycle. A coarse cell has one value for 2 × 2 cells, and its conductances are sums of theirs. Such corrections are about
-half too small, and are scaled up (Braess, "Towards algebraic multigrid for elliptic problems of second order", 1995).
-It is slow; devices have compute.diffusion_gpu.
+These coefficients are harmonic functions with the scribbles as fixed values and free (Neumann) edges. Conductances keep
+them from spreading across edges of the picture. They are solved for by conjugate gradients, preconditioned with a
+multigrid cycle. A coarse cell has one value for 2 × 2 cells, and its conductances are sums of theirs. Such corrections
+are about half too small, and are scaled up (Braess, "Towards algebraic multigrid for elliptic problems of second
+order", 1995). It is slow; devices have compute.diffusion_gpu.
 """
 
 from typing import NamedTuple
@@ -25,15 +25,16 @@ NOTHING = 1 / 4096
 
 
 def diffuse(labels: np.ndarray, count: int, guide: np.ndarray | None = None, strength: float = 0.0) -> np.ndarray:
-    """Return coefficients (count, H, W) float32, at least 0, with a sum of 1.
+    """Return how much of each shutter a pixel gets: coefficients (count, H, W) float32, at least 0, with a sum of 1.
 
-    Labels without any scribble give the first shutter everywhere.
+    Without any scribble, every pixel gets the first shutter.
 
     Args:
-        labels: (H, W): 0 free, 1 + shutter fixed
-        count: the number of shutters
-        guide: (h, w, 3 or more), as for core.pixels.conductances; its cells are 1, 2, 4, … pixels wide
-        strength: up to 1, how much conductances follow the guide
+        labels: (H, W): 0 where a pixel is free, 1 + shutter where that shutter is drawn.
+        count: The number of shutters.
+        guide: The picture whose edges stop the diffusion, (h, w, 3 or more), as for core.pixels.conductances; its cells
+            are 1, 2, 4, … pixels wide. None: nothing stops it.
+        strength: 0 to 1, how strictly edges stop it.
     """
     drawn = np.flatnonzero(np.bincount(labels.ravel(), minlength=count + 1)[1:])  # the others are 0 everywhere
     coefficients = np.zeros((count, *labels.shape), np.float32)
@@ -69,13 +70,13 @@ class _Grid(NamedTuple):
 
 
 def _solved(labels: np.ndarray, shutters: np.ndarray, across: np.ndarray, down: np.ndarray) -> np.ndarray:
-    """Return the harmonic functions (N, H, W) of some shutters, not clipped.
+    """Return the coefficients (N, H, W) of some shutters by conjugate gradients, with small errors, not clipped.
 
     Args:
-        labels: (H, W): 0 free, 1 + shutter fixed
-        shutters: (N,)
-        across: (H, W − 1), conductances to the right
-        down: (H − 1, W), conductances to the row below
+        labels: As for `diffuse`.
+        shutters: (N,) indices.
+        across: (H, W − 1), conductances to the pixel on the right.
+        down: (H − 1, W), conductances to the pixel below.
     """
     free = labels == 0
     ground = _inflow(across, down, (~free).astype(np.float32)) * free
@@ -100,6 +101,7 @@ def _solved(labels: np.ndarray, shutters: np.ndarray, across: np.ndarray, down: 
 
 
 def _grid(across: np.ndarray, down: np.ndarray, ground: np.ndarray) -> _Grid:
+    """Return a grid with these conductances, and the inverse of each cell's sum."""
     diagonal = ground.copy()
     for ties, cells in ((across, diagonal), (down.T, diagonal.T)):
         cells[:, :-1] += ties
@@ -109,7 +111,10 @@ def _grid(across: np.ndarray, down: np.ndarray, ground: np.ndarray) -> _Grid:
 
 
 def _inflow(across: np.ndarray, down: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return the flow into each cell (…, h, w). It sums differences: a rounded diagonal would leak."""
+    """Return what flows into each cell (…, h, w) from its neighbors, for the cells' values (…, h, w).
+
+    It sums differences: with a rounded diagonal, some would leak.
+    """
     stopping.check()
     flow = np.zeros_like(values)
     for passed, before, after in (
@@ -122,12 +127,17 @@ def _inflow(across: np.ndarray, down: np.ndarray, values: np.ndarray) -> np.ndar
 
 
 def _missing(grid: _Grid, values: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Return the residual of values (N, h, w)."""
+    """Return the residual of the equations of a grid for values (N, h, w) and a right-hand side `right`."""
     return right + _inflow(grid.across, grid.down, values) - grid.ground * values
 
 
 def _cycle(grids: list[_Grid], right: np.ndarray) -> np.ndarray:
-    """Return an approximate solution (N, h, w), by a cycle over these grids."""
+    """Return an approximate solution (N, h, w) of the first grid's equations, by a multigrid cycle.
+
+    Args:
+        grids: The grid and the coarser ones.
+        right: The right-hand side (N, h, w).
+    """
     grid, *below = grids
     if not below:
         return grid.inverse * right
@@ -139,7 +149,7 @@ def _cycle(grids: list[_Grid], right: np.ndarray) -> np.ndarray:
 
 
 def _in_twos(values: np.ndarray, axis: int) -> np.ndarray:
-    """Return sums of pairs along an axis. The last one may be single."""
+    """Return the sums of pairs of values along an axis. The last one may be single."""
     along = values.swapaxes(axis, 0)
     total, others = along[::2].copy(order="K"), along[1::2]
     total[: len(others)] += others
@@ -147,13 +157,15 @@ def _in_twos(values: np.ndarray, axis: int) -> np.ndarray:
 
 
 def _in_fours(values: np.ndarray) -> np.ndarray:
-    """Return sums over 2 × 2 cells (…, h, w)."""
+    """Return the sums over 2 × 2 cells of values (…, h, w). The last ones may be of fewer."""
     return _in_twos(_in_twos(values, values.ndim - 2), values.ndim - 1)
 
 
 def _dot(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return the scalar product (N, 1, 1) of each pair of fields (N, h, w)."""
     return (one * other).sum(axis=(1, 2), keepdims=True)
 
 
 def _ratio(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return a / b, or 0 where b is not positive."""
     return np.divide(a, b, out=np.zeros_like(a), where=b > 0)

@@ -1,4 +1,4 @@
-"""Diffusion on a device: the harmonic function of compute.diffusion, at full size only near scribbles.
+"""Diffusion on a GPU: the same coefficients as compute.diffusion, solved for at full size only near scribbles.
 
 The method is multigrid. The cells of grid 0 are the pixels; those of a coarser grid lie on the even cells of the finer
 one. Far from scribbles the solution is smooth, so a grid solves only tiles near scribbles (BAND). Elsewhere its values
@@ -7,8 +7,8 @@ are interpolated linearly from the next coarser grid.
 For one grid, let U be its values, f its right-hand side, A its operator, P the prolongation from the next coarser grid
 and U' the values of that grid. The grid's own part W = U − P U' is zero outside its tiles. The next grid has the
 right-hand side Pᵀ(f − A W) and the Galerkin operator PᵀAP, a stencil of nine points. P follows the operator, as in
-Dendy's black box multigrid: fixed pixels are walls on every grid, so the number of cycles needed does not depend on
-the scene.
+Dendy's black box multigrid: fixed pixels are walls on every grid, so the number of cycles needed does not depend on the
+scene.
 
 A solve that starts from nothing depends only on the labels, to the bit. For that, operators are made again where
 scribbles are or were in the last solve, and W and f are cleared there and outside the tiles.
@@ -49,7 +49,11 @@ HOLD = 0.3
 
 
 def operators(ties: str) -> dict[str, Pass]:
-    """Return the passes that depend on how cells are coupled (shaders/multigrid.glsl)."""
+    """Return the passes of shaders/multigrid.glsl, by name in small letters, for one way in which cells are coupled.
+
+    Args:
+        ties: "STENCIL" for coarse cells, "LABELS" for pixels, "LINKS" for pixels whose couplings follow edges.
+    """
     return {
         name: read_pass("multigrid", name.upper(), **{ties: 1}) for name in ("weights", "coarsen", "smooth", "restrict")
     }
@@ -71,7 +75,7 @@ _RANGES |= {"anew": (4, 5), "feeding": (5, 6), "changed": (6, 7)}
 
 
 class _Grid:
-    """A grid's textures and tiles.
+    """The textures of a multigrid's grid, and which of its tiles passes have to go through.
 
     The textures are rgba32f, except the labels:
         solution, own, right: U, W and f, four shutters per layer; the finest grid has no f
@@ -113,7 +117,10 @@ class _Grid:
 
 
 class Diffusion:
-    """compute.diffusion.diffuse on a device. Its textures are kept until the size or the number of shutters changes."""
+    """Solves for how much of each shutter a pixel gets, as it spreads from drawn strokes, on a device.
+
+    Its textures are kept until the size or the number of shutters changes.
+    """
 
     finest = operators("LABELS")  # the passes over pixels
     returns = False  # whether sweeps after a correction go backward
@@ -126,12 +133,12 @@ class Diffusion:
         self._textures = NamedTextures(device)
 
     def solve(self, labels: np.ndarray, count: int, *, warm: bool = False) -> Texture:
-        """Solve for coefficients. Nothing is read back from the device.
+        """Return how much of each shutter a pixel gets, like compute.diffusion.diffuse without a guide, on the device.
 
         Args:
-            labels: (H, W) uint16: 0 free, 1 + shutter fixed
-            count: the number of shutters
-            warm: start from the last solution, if it has this size and count. It is faster if scribbles moved a little,
+            labels: (H, W) uint16: 0 where a pixel is free, 1 + shutter where that shutter is drawn.
+            count: The number of shutters.
+            warm: Start from the last solution, if it has this size and count. It is faster if scribbles moved a little,
                 and the result depends on the last solution, within the error.
 
         Returns:
@@ -151,6 +158,7 @@ class Diffusion:
         return finest.textures["solution"]
 
     def release(self) -> None:
+        """Free all textures. Call it inside `Device.current` or `Device.freeing`."""
         for grid in self._grids:
             for texture in grid.textures.values():
                 texture.release()
@@ -158,7 +166,11 @@ class Diffusion:
         self._grids, self._made_for = [], None
 
     def _prepare(self, shape: tuple[int, ...], count: int) -> bool:
-        """Make the grids for a size (H, W) and a number of shutters. Return whether they had a solution already."""
+        """Make the grids for pictures of a size (H, W) and a number of shutters, unless there are such grids.
+
+        Returns:
+            Whether there were, with the solution of the last solve.
+        """
         height, width = shape
         if self._made_for == (width, height, count):
             return True
@@ -174,12 +186,12 @@ class Diffusion:
         return False
 
     def _list_tiles(self, labels: np.ndarray, whole: int, *, anew: bool = False) -> None:
-        """Send the lists of tiles of all grids to the device, and note their ranges.
+        """Find out which tiles each pass has to go through, and send lists of them to the device (see _Grid).
 
         Args:
-            labels: (H, W)
-            whole: the first grid that is solved everywhere
-            anew: whether all operators have changed since the last solve
+            labels: (H, W), as for `solve`.
+            whole: The number of the first grid that is solved in all tiles.
+            anew: Whether all operators have changed since the last solve.
         """
         held, free = _in_fours(labels != 0)
         listed, end = [], 0
@@ -212,14 +224,18 @@ class Diffusion:
         self._device.write(self._tiles, rows)
 
     def _start(self, warm: int) -> None:
-        """Set the starting values, and clear what other scribbles left."""
+        """Set the values from which the solve starts, and clear what other scribbles left.
+
+        Args:
+            warm: 1: keep the last solution as the start; 0: start from nothing.
+        """
         finest = self._grids[0]
         self._run(_START, finest, "anew", 64, finest.layers, warm=warm)
         for fine, grid in pairwise(self._grids):
             self._run(_CLEAR, grid, "anew", 64, grid.layers, finer=fine.textures["solution"], warm=warm)
 
     def _coarsen(self) -> None:
-        """Make each grid's prolongation P, and from it the next grid's operator."""
+        """Make each grid's prolongation P, and from it the operator of the next coarser grid."""
         for fine, coarse in pairwise(self._grids):
             weights, coarsen = (self._pass(fine, name) for name in ("weights", "coarsen"))
             self._run(weights, fine, "changed", 8, hold=HOLD)
@@ -228,7 +244,7 @@ class Diffusion:
             self._run(coarsen, coarse, "changed", 16, **to)
 
     def _cycle(self, index: int) -> None:
-        """Run a V-cycle over the grid of this index and all coarser ones."""
+        """Run a V-cycle over the grid with a number and all coarser ones, which improves that grid's solution."""
         grid, *coarser = self._grids[index : index + 2]
         if not coarser:
             self._solve_coarsest(grid)
@@ -243,35 +259,53 @@ class Diffusion:
         self._smooth(grid, sweeps, back=self.returns)
 
     def _correct(self, index: int) -> None:
-        """Improve the solution of a grid that corrects a finer one."""
+        """Improve the solution of the grid with a number, which then corrects the next finer one."""
         finer, grid = self._grids[index - 1 : index + 1]
         first_whole = max(grid.size) <= WHOLE and (finer.finest or max(finer.size) > WHOLE)
         for _ in range(1 + first_whole):
             self._cycle(index)
 
     def _solve_coarsest(self, grid: _Grid) -> None:
+        """Solve the equations of the coarsest grid exactly."""
         self._run(_SOLVE, grid, "near", 1, grid.layers)  # it has one tile
 
     def _take_up(self, grid: _Grid, coarse: _Grid, tiles: str) -> None:
-        """Set U to W + P U', where U' is the next grid's solution."""
+        """Set a grid's values U to W + P U', where U' are those of the next coarser grid. `tiles`: as for `_run`."""
         self._prolong(grid, coarse, tiles, {"from": grid.textures["own"], "to": grid.textures["solution"]}, 1.0)
 
     def _prolong(self, grid: _Grid, coarse: _Grid, tiles: str, images: dict[str, Texture], amount: float) -> None:
+        """Set an image of a grid to another one plus the interpolated solution of the next coarser grid.
+
+        Args:
+            grid: The grid.
+            coarse: The next coarser grid.
+            tiles: As for `_run`.
+            images: {"from": the other image, "to": the image}.
+            amount: The factor of the solution.
+        """
         coarser = {"coarse": coarse.size, "coarser": coarse.textures["solution"]}
         self._run(_PROLONG, grid, tiles, 16, grid.layers, **coarser, **images, amount=amount)
 
     def _restrict(self, grid: _Grid, coarse: _Grid, own: Texture) -> None:
-        """Make the next grid's right side from the residual of `own`."""
+        """Make the right-hand side of the next coarser grid from the residual of a grid's values, as multigrid does.
+
+        Args:
+            grid: The grid.
+            coarse: The next coarser grid.
+            own: The values.
+        """
         to = {"coarse": coarse.size, "next": coarse.textures["right"]}
         self._run(self._pass(grid, "restrict"), grid, "feeding", 16, grid.layers, own=own, **to)
 
     def _smooth(self, grid: _Grid, sweeps: int, *, back: bool = False) -> None:
-        """Run Gauss-Seidel sweeps: red-black at full size, where cells have four neighbors, else in four colors.
+        """Run Gauss-Seidel sweeps over a grid, which smooth the error of its solution.
+
+        They are red-black at full size, where cells have four neighbors, else in four colors.
 
         Args:
-            grid: the grid
-            sweeps: their number
-            back: whether colors come in the opposite order
+            grid: The grid.
+            sweeps: Their number.
+            back: Whether colors come in the opposite order.
         """
         cells: int = 32
         colours: list[int | tuple[int, int]] = [0, 1]
@@ -282,10 +316,11 @@ class Diffusion:
             self._run(self._pass(grid, "smooth"), grid, "near", cells, grid.layers, values=values, colour=colour)
 
     def _pass(self, grid: _Grid, name: str) -> Pass:
+        """Return the pass of `operators` with a name, for the way in which a grid's cells are coupled."""
         return self.finest[name] if grid.finest else _COARSER[name]
 
     def _finish(self) -> None:
-        """Make coefficients of the solution in all cells, from the coarsest grid to the finest."""
+        """Turn the solution into coefficients ≥ 0 with a sum of 1 in all cells, the coarsest grid first."""
         for index, grid in reversed(list(enumerate(self._grids))):
             self._run(FINISH, grid, "near", 64, nothing=NOTHING)
             if index + 1 < len(self._grids):
@@ -302,12 +337,12 @@ class Diffusion:
         """Run a pass over a list of the grid's tiles.
 
         Args:
-            program: the pass
-            grid: the grid
-            tiles: the list, a key of grid.ranges
-            cells: invocations for each tile
-            layers: layers of four shutters
-            extra: textures and constants besides the grid's, by name
+            program: The pass.
+            grid: The grid.
+            tiles: The list, a key of _Grid.ranges.
+            cells: Invocations for each tile.
+            layers: Layers of four shutters.
+            extra: Textures and constants besides the grid's, by name.
         """
         first, last = grid.ranges[tiles]
         if first == last:
@@ -326,10 +361,10 @@ class Diffusion:
 
 
 def _in_fours(fixed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return which tiles (rows, columns) of 4 × 4 cells have fixed cells, and which have free ones.
+    """Return which tiles of 4 × 4 cells have fixed cells, and which have free ones: bool (rows, columns) each.
 
     Args:
-        fixed: (H, W) bool
+        fixed: The cells, (H, W) bool. Beyond the edges they repeat.
     """
     height, width = fixed.shape
     if height % 4 or width % 4:
@@ -341,18 +376,20 @@ def _in_fours(fixed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _codes(rows: int, columns: int, fours: int) -> np.ndarray:
-    """Return each tile's code (rows, columns) float32 for the shaders: x + 4096 · y of its first cell, in fours.
+    """Return the numbers by which shaders know tiles, (rows, columns) float32: x + 4096 · y of a tile's first cell.
 
     Args:
-        rows: of tiles
-        columns: of tiles
-        fours: a tile's side, in fours of cells
+        rows, columns: The number of tiles.
+        fours: A tile's side; it and x and y count in fours of cells.
     """
     return (fours * (np.arange(columns) + 4096 * np.arange(rows)[:, None])).astype(np.float32)
 
 
 def _last_ones(grid: _Grid) -> np.ndarray:
-    """Return the tiles (rows, columns) that go beyond the next grid's last cells: the last ones of an even side."""
+    """Return which tiles (rows, columns) go beyond the last cells of the next coarser grid.
+
+    They are the last ones along a side with an even number of cells.
+    """
     width, height = grid.size
     last = np.zeros_like(grid.reached)
     last[:, -1] = width % 2 == 0
@@ -361,7 +398,7 @@ def _last_ones(grid: _Grid) -> np.ndarray:
 
 
 def _grown(tiles: np.ndarray, times: int = 1) -> np.ndarray:
-    """Return tiles (rows, columns) bool grown by `times` tiles to every side."""
+    """Return which tiles (rows, columns) are set in `tiles`, or within `times` tiles of a set one, also diagonally."""
     for _ in range(times):
         rows = tiles.copy()
         rows[1:] |= tiles[:-1]

@@ -1,8 +1,8 @@
-"""Diffusion along edges on a device (compute.diffusion), until the last cycle at full size only near scribbles.
+"""Diffusion on a GPU that stops at edges of the picture (compute.diffusion with a guide).
 
 A grid cannot resolve edges that are finer than its cells. So one grid is solved by conjugate gradients, where each
 iteration is a cycle over it and the coarser ones: the grid with the guide's cells, or the one after the pixels if those
-are pixels. On finer grids conductances are smooth.
+are pixels. On finer grids conductances are smooth. Until the last cycle, full size is solved only near scribbles.
 """
 
 from itertools import pairwise
@@ -44,7 +44,10 @@ _SUM = read_pass("edge_diffusion", "SUM")
 
 
 class EdgeDiffusion(Diffusion):
-    """Diffusion along edges on a device. It has other passes for pixels, and conjugate gradients on one grid."""
+    """Solves for how much of each shutter a pixel gets, as it spreads from drawn strokes up to edges of the picture.
+
+    It runs on a device, and differs from Diffusion by other passes for pixels, and by conjugate gradients on one grid.
+    """
 
     finest = operators("LINKS")
     returns = True
@@ -55,10 +58,17 @@ class EdgeDiffusion(Diffusion):
         self._solved, self._sweeps, self._iterations = 0, 0, 0
 
     def solve(self, labels: np.ndarray, count: int, guide: np.ndarray, strength: float) -> Texture:  # type: ignore[override]  # it has a guide
-        """Solve for coefficients, independently of earlier solves. See Diffusion.solve and compute.diffusion.diffuse.
+        """Return how much of each shutter a pixel gets, like compute.diffusion.diffuse with a guide, on the device.
 
-        Some pixels must be fixed, and some free. If the guide's cells are pixels, one number is read back after each
-        cycle: whether it was enough.
+        It does not depend on earlier solves. Some pixels must be drawn on, and some free. If the guide's cells are
+        pixels, one number is read back after each cycle: whether it was enough.
+
+        Args:
+            labels, count: As for Diffusion.solve.
+            guide, strength: As for compute.diffusion.diffuse.
+
+        Returns:
+            As for Diffusion.solve.
         """
         side = cell_side(guide.shape[:2], labels.shape)
         self._prepare(labels.shape, count)
@@ -90,9 +100,9 @@ class EdgeDiffusion(Diffusion):
         return self._grids[0].textures["solution"]
 
     def _provide(self, cells: tuple[int, int]) -> None:
-        """Make the textures that plain diffusion does not have.
+        """Make the textures that Diffusion does not have, for a guide with this shape of cells.
 
-        Clear those of conjugate gradients: passes skip tiles without free cells, but sums include them.
+        Those of conjugate gradients are cleared: passes skip tiles without free cells, but sums include them.
         """
         grid, finest = self._grids[self._solved], self._grids[0]
         vectors = dict.fromkeys(("residual", "guess", "direction", "answer"), (*grid.size, grid.layers))
@@ -105,14 +115,17 @@ class EdgeDiffusion(Diffusion):
             finest.textures["links"] = self._device.texture(*finest.size, 1, "rgba32f")
 
     def _correct(self, index: int) -> None:
-        """See Diffusion. V-cycles near scribbles go down to the grid of the conjugate gradients."""
+        """Improve the solution of the grid with a number, which then corrects the next finer one.
+
+        Conjugate gradients improve it on their grid, and a cycle does on finer grids.
+        """
         if index == self._solved:
             self._conjugate_gradients(self._grids[index], self._iterations)
         else:
             self._cycle(index)
 
     def _conjugate_gradients(self, grid: _Grid, iterations: int) -> None:
-        """Improve the grid's solution by conjugate gradients."""
+        """Improve a grid's solution by some iterations of conjugate gradients, which a cycle preconditions."""
         own, more = grid.textures, self._more
         solution, right = own["solution"], own["right"]
         self._run(_MISSING, grid, "near", 64, grid.layers, values=solution, result=more["residual"], amount=1.0)
@@ -135,12 +148,12 @@ class EdgeDiffusion(Diffusion):
             own["solution"], own["right"] = solution, right
 
     def _visit(self, index: int, iterations: int = 0, twice: int = 0) -> None:
-        """Improve a grid's solution by a cycle over it and the coarser grids.
+        """Improve a grid's solution by a cycle over it and the coarser grids, in all tiles.
 
         Args:
-            index: the grid's number
-            iterations: of conjugate gradients, if they solve a coarser grid
-            twice: how many of the next grids are visited twice
+            index: The grid's number.
+            iterations: Of conjugate gradients, if they solve a coarser grid.
+            twice: How many of the next grids are visited twice.
         """
         grid, *coarser = self._grids[index : index + 2]
         if not coarser:
@@ -159,6 +172,7 @@ class EdgeDiffusion(Diffusion):
         self._smooth(grid, self._sweeps, back=True)
 
     def _clear(self, grid: _Grid, values: Texture) -> None:
+        """Set all values of a texture of a grid's size to 0."""
         self._device.run(_ZERO, (*grid.size, grid.layers), images={"values": values}, size=grid.size)
 
     def _change(self) -> float:
@@ -171,6 +185,7 @@ class EdgeDiffusion(Diffusion):
         return self._device.read(self._more["parts"])[:, :, :parts].max()
 
     def _dot(self, grid: _Grid, one: Texture, other: Texture, place: int) -> None:
+        """Compute the scalar product of two fields of a grid for each shutter, into the texture of sums at a place."""
         parts = min(PARTS, grid.size[0] * grid.size[1])
         images = {"values": one, "right": other, "result": self._more["parts"]}
         self._device.run(_DOT, (parts, 1, grid.layers), images=images, size=(parts, 1), grid=grid.size)
@@ -182,7 +197,7 @@ def _is_enough(change: float, before: float) -> bool:
     """Return whether cycles can end, assuming that changes go on shrinking at the same rate.
 
     Args:
-        change: the largest change of a coefficient in the last cycle
-        before: the same for the cycle before; 0 if there was none
+        change: The largest change of a coefficient in the last cycle.
+        before: The same for the cycle before; 0 if there was none.
     """
     return change == 0 or (change < before and change**2 < ENOUGH * (before - change))

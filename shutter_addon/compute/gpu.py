@@ -1,8 +1,8 @@
-"""Compositing on a device: a compute pass for each picture and band of rows, over the window's frames or running sums.
-And the display's levels of a picture (core.pixels.shown_levels).
+"""Compose pictures on a device: run a compute pass over the window's frames or running sums, for each band of rows.
 
-Powers on devices differ in their last bits. So the device evaluates parabolas, which only add and multiply, and marks
-pixels that are too near to the end of a level. For those, about one in a hundred, the display itself is used.
+A picture can also be converted to the 8-bit levels of a display (core.pixels.shown_levels). Powers on devices differ in
+their last bits. So the device evaluates parabolas, which only add and multiply, and marks pixels that are too near to
+the end of a level. For those, about one in a hundred, the display itself is used.
 """
 
 from contextlib import suppress
@@ -57,7 +57,7 @@ PICK = read_pass("display", "PICK")
 
 
 def _light(window: Any, request: Request) -> dict[str, int | str]:
-    """Return the macros for how passes over a window read, sum, combine and store light."""
+    """Return macros for the passes over a window: how they read, sum, combine and store light."""
     (combine,), alpha = request.state.groups, window.source.alpha
     return {
         "DECODE": window.decode(request.state.options.light),
@@ -75,13 +75,15 @@ def _light(window: Any, request: Request) -> dict[str, int | str]:
 
 
 def _from_sums(window: Sums, request: Request, values: np.ndarray, origin: int) -> tuple[Pass, Given]:
-    """Return compose_sums for a table of pieces, and its arguments for Device.run, without those of the band.
+    """Return the pass that composes a picture from running sums, and its arguments for Device.run.
+
+    The caller adds those of a band of rows.
 
     Args:
-        window: the running sums
-        request: the picture
-        values: of composition_passes.table
-        origin: the position of the window's first frame
+        window: The running sums.
+        request: The picture.
+        values: The table of shutters, from composition_passes.table.
+        origin: The position of the window's first frame (core.model.windows).
     """
     groups, rows, back = values.shape[1] // 2, filled_rows(len(values) - 1), request.direction < 0
     filled = np.zeros((1 + rows, *values.shape[1:]), np.float32)
@@ -98,15 +100,15 @@ def _from_sums(window: Sums, request: Request, values: np.ndarray, origin: int) 
 def _from_frames(
     way: str, window: Any, request: Request, rows: int, origin: int, shortened: bool
 ) -> tuple[Pass, Given]:
-    """Return the pass of another way, and its arguments, like _from_sums.
+    """Return the pass that composes a picture in another way than from sums, and its arguments, like _from_sums.
 
     Args:
-        way: of composition_passes.way_of
-        window: frames or running sums
-        request: the picture
-        rows: pieces in the table
-        origin: the position of the window's first frame
-        shortened: as for way_of
+        way: From composition_passes.way_of.
+        window: The frames or running sums.
+        request: The picture.
+        rows: The number of pieces in the table of shutters.
+        origin: The position of the window's first frame (core.model.windows).
+        shortened: As for way_of.
     """
     state, direction, shot = request.state, request.direction, window.shot
     options, (combine,) = state.options, state.groups
@@ -126,7 +128,13 @@ def _from_frames(
 
 
 def _threshold(combine: Combine, request: Request, shot: range) -> Given:
-    """Return the arguments of passes with a threshold."""
+    """Return the arguments of passes for a threshold of trails, empty without one.
+
+    Args:
+        combine: How frames are combined.
+        request: The picture.
+        shot: The source frames that may be shown.
+    """
     if combine.threshold is None:
         return {}
     options = request.state.options
@@ -136,7 +144,11 @@ def _threshold(combine: Combine, request: Request, shot: range) -> Given:
 
 
 def _in_window(state: FrameState, chosen: tuple[int, ...]) -> FrameState:
-    """Return the state of some shutters. If any other follows something, these do, too: the window has whole frames."""
+    """Return the state of some shutters alone, for a window that was made for all of them.
+
+    If any shutter follows something, the window has whole frames. Then these follow as well, with no motion if they
+    have none.
+    """
     part, following = state.of(chosen), state.following
     if following is None or part.following is not None:
         return part
@@ -145,12 +157,15 @@ def _in_window(state: FrameState, chosen: tuple[int, ...]) -> FrameState:
 
 
 def _bits(coefficients: Coefficients) -> int:
-    """Return the shift from a pixel's place to that of its coefficients."""
+    """Return the bits by which a pixel's place is shifted to that of its block's coefficients."""
     return (coefficients.block - 1).bit_length()
 
 
 def _curve(display: Display) -> np.ndarray:
-    """Return the pieces (1, n, 4) float32 of the curve for shaders/display.glsl."""
+    """Return the parabolas (1, n, 4) float32 that approximate the display's curve, for shaders/display.glsl.
+
+    Each has three coefficients and the largest error, in levels.
+    """
     starts = np.arange(_FIRST, _FIRST + _PIECES, dtype=np.uint32) << np.uint32(_SHIFT)
     steps = np.linspace(0, (1 << _SHIFT) - 1, _PROBED).astype(np.uint32)
     values = display.transfer((starts[:, None] + steps).view(np.float32)).astype(np.float64) * 255
@@ -162,7 +177,7 @@ def _curve(display: Display) -> np.ndarray:
 
 
 class GPUCompositor:
-    """request.Compositor on a Device."""
+    """Composes pictures on a device (request.Compositor)."""
 
     def __init__(self, device: Device) -> None:
         self.device, self.name, self.takes_planes = device, device.name, device.takes_planes
@@ -173,7 +188,11 @@ class GPUCompositor:
     def window(
         self, source: FrameSource, capacity: int, moved: bool = False, shutters: int = 4, summed: bool = True
     ) -> Window:
-        """See request.Compositor: running sums if the source allows them and the device has room."""
+        """Return a window for frames of a source: with running sums if the source allows them and the device has room.
+
+        Args:
+            source, capacity, moved, shutters, summed: As for request.Compositor.window.
+        """
         size = self.device, source, capacity, shutters
         if moved:
             return PackedFrames(*size) if summable(source) else WholeFrames(*size)
@@ -185,28 +204,37 @@ class GPUCompositor:
         return Frames(*size)
 
     def stages(self) -> Stages:
+        """Return what makes coefficients, and lays layers over one another, on this device."""
         return Stages(self.device)
 
     def labels(self, values: np.ndarray) -> Texture:
-        """See request.Compositor."""
+        """Send labels (H, W) uint16 to the device, and return them as a texture r32ui, valid until the next call."""
         return self._textures.filled("labels", [values.astype(np.uint32)], "r32ui")
 
     def coefficients(self, handle: Texture, count: int) -> np.ndarray:
+        """Return how much of each shutter a pixel gets, (count, h, w) float32, from a texture array.
+
+        Args:
+            handle: The texture array, with four shutters to a layer.
+            count: The number of shutters.
+        """
         values = self.device.read(handle)
         return np.moveaxis(values, -1, 1).reshape(-1, *values.shape[1:3])[:count]
 
     def read(self, drawn: Texture) -> np.ndarray:
+        """Return a drawn picture as an array (H, W, 4), top row first: float32, or levels in uint8."""
         picture = self.device.read(drawn)[0]
         return picture if drawn.kind == "rgba8" else picture[::-1]
 
     def over_black(self, drawn: Texture) -> np.ndarray:
+        """Return 8-bit sRGB levels (H, W, 4) of a drawn scene-linear picture over black, top row first."""
         size = drawn.size[:2]
         texture = self._textures.of("levels", (*size, 1), "rgba8")
         self.device.run(LEVELS, size, images={"picture": drawn, "levels": texture}, size=size)
         return self.device.read(texture)[0]
 
     def shown(self, drawn: Texture, display: Display) -> np.ndarray:
-        """See request.Compositor."""
+        """Return the display's levels (H, W, 4) uint8 of a drawn, opaque, scene-linear picture, top row first."""
         width, height, _ = drawn.size
         noise, levels = display.noise(width, height), self._textures.of("levels", (width, height, 1), "rgba8")
         images = {"picture": drawn, "levels": levels}
@@ -226,7 +254,12 @@ class GPUCompositor:
         return made
 
     def _picked(self, picture: Texture, places: np.ndarray) -> np.ndarray:
-        """Return the light (n, 3) of pixels, given by their numbers."""
+        """Return the light (n, 3) of some pixels of a picture.
+
+        Args:
+            picture: The picture.
+            places: The numbers of the pixels (n,), row by row.
+        """
         size = _COLUMNS, -(-len(places) // _COLUMNS)
         numbers = np.zeros((size[1], _COLUMNS), np.uint32)
         numbers.ravel()[: len(places)] = places
@@ -237,7 +270,12 @@ class GPUCompositor:
         return self.device.read(picked)[0].reshape(-1, 4)[: len(places), :3]
 
     def _send(self, display: Display, noise: np.ndarray) -> tuple[dict[str, Texture], float]:
-        """Return the textures of the noise and of the curve, and OpenColorIO's slope below it, which is not 12.92."""
+        """Send a display's noise and curve to the device.
+
+        Returns:
+            {name: texture} for both, and the slope of the display's linear part, which is not sRGB's 12.92 in
+            OpenColorIO.
+        """
         slope = 255 * float(display.transfer(np.array([2.0**_LOWEST], np.float32))[0]) / 2.0**_LOWEST
         grain = self._textures.filled("grain", [noise], "r32f")
         return {"grain": grain, "curve": self._textures.filled("curve", [_curve(display)])}, slope
@@ -245,8 +283,13 @@ class GPUCompositor:
     def draw(self, window: Handle, request: Request, coefficients: Coefficients) -> Texture:
         """Return the picture on the device, premultiplied: a texture array with one layer.
 
-        It is rgba32f, scene-linear, bottom row first; or with levels rgba8, display code values, top row first. It is
-        the window's texture, valid until its next picture of the kind. The window must have loaded all exposed frames.
+        It is rgba32f, scene-linear, bottom row first; or with request.levels rgba8, display code values, top row first.
+        It belongs to the window, and is valid until the window's next picture of this format.
+
+        Args:
+            window: The window, which has loaded all exposed frames.
+            request: The picture.
+            coefficients: How much of each shutter a pixel gets.
         """
         if len(request.state.groups) > 1:
             return self._draw_ways(window, request, coefficients)
@@ -286,7 +329,10 @@ class GPUCompositor:
         return picture
 
     def _draw_ways(self, window: Handle, request: Request, coefficients: Coefficients) -> Texture:
-        """Draw shutters that combine frames in several ways: a picture for each way, mixed."""
+        """Draw a picture whose shutters combine frames in several ways, such as average and lightest.
+
+        A picture is drawn for each way, and these are mixed. Arguments and result as for `draw`.
+        """
         state, size = request.state, (window.source.width, window.source.height)
         groups = list(state.groups.values())
         for number, chosen in enumerate(groups):
@@ -302,7 +348,16 @@ class GPUCompositor:
         return window.picture(levels=True) if request.levels else window.mixed()
 
     def _selected(self, handle: Texture, chosen: tuple[int, ...], count: int) -> tuple[Texture, Texture]:
-        """Return the coefficients of some shutters, and their sum: valid until the next call."""
+        """Return textures of how much of the chosen shutters each pixel gets, relative to each other and in sum.
+
+        The first has their coefficients scaled to a sum of 1, the second that sum before. Both are valid until the next
+        call.
+
+        Args:
+            handle: The coefficients of all shutters.
+            chosen: The indices of the shutters.
+            count: The number of all shutters.
+        """
         groups, (width, height, _) = -(-len(chosen) // 4), handle.size
         numbers = np.full((groups, 4), -1, np.float32)
         numbers.flat[: len(chosen)] = chosen
@@ -315,9 +370,10 @@ class GPUCompositor:
         return selected, share
 
     def _draw_on_host(self, window: Handle, request: Request, coefficients: Coefficients) -> Texture:
-        """Draw medians with NumPy that a device cannot draw.
+        """Draw a median of frames with NumPy that the device cannot draw, and send it to the device.
 
-        Those of following exposures need all frames in one pass. Others take too many loop iterations for a device.
+        Those of exposures that follow something need all frames in one pass. Others take too many loop iterations for
+        llvmpipe. Arguments and result as for `draw`.
         """
         host, source, options = cpu.CPUCompositor(), window.source, request.state.options
         frames = host.window(source)
@@ -330,7 +386,10 @@ class GPUCompositor:
         return picture
 
     def _draw_moved(self, window: WholeFrames, request: Request, coefficients: Coefficients) -> Texture:
-        """Draw shutters that follow something. Each texture array of frames has a pass that adds to the last one."""
+        """Draw a picture whose shutters follow a motion.
+
+        For each texture array of frames, a pass adds to the last one's result. Arguments and result as for `draw`.
+        """
         state, options, size = request.state, request.state.options, (window.source.width, window.source.height)
         (combine,), (first, last) = state.groups, state.open_span
         frames = windows.indices(options, request.index, window.shot, request.direction)
@@ -368,6 +427,7 @@ class GPUCompositor:
         return picture
 
     def release(self) -> None:
+        """Free all textures and the device."""
         with self.device.freeing():
             self._textures.release()
         self._displayed.clear()

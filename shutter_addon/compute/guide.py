@@ -1,4 +1,4 @@
-"""Guides of edge-aware diffusion: pictures whose edges make resistances (core.pixels.conductances).
+"""Guides of the diffusion: pictures at whose edges scribbles stop (*Follow Edges*; core.pixels.conductances).
 
 A guide has the shown frame's display values in cells of 1, 2, 4 … pixels, without the finest detail. Its differences
 are scaled to those of a picture of ROWS rows (or columns, if it is upright).
@@ -29,29 +29,33 @@ _WHITE = 65535
 
 
 def guiding(index: int, step: int, shot: range) -> tuple[int, ...]:
-    """Return the frames that make the guide of frame `index`: that one, then the filmed ones around it in its shot.
+    """Return the source frames that make the guide of a shown frame: that one, then the filmed ones around it.
 
     Args:
-        index: the source frame
-        step: every step-th frame was filmed
-        shot: the source frames of its shot
+        index: The shown source frame.
+        step: Every step-th frame was filmed.
+        shot: The source frames of its shot; others do not count.
     """
     near = range(max(index - reach(step), shot.start), min(index + reach(step) + 1, shot.stop))
     return index, *(i for i in near if i % step == 0 and i != index)
 
 
 def reach(step: int) -> int:
-    """Return the largest distance of those frames from the shown one."""
+    """Return how far the frames of `guiding` are from the shown one at most, in source frames."""
     return BESIDE * step
 
 
 def cell_of(short: int) -> int:
-    """Return the side of a guide's cells in pixels, for the picture's shorter side in pixels."""
+    """Return the side of a guide's cells in pixels.
+
+    Args:
+        short: The picture's shorter side in pixels.
+    """
     return 1 << max(short // REDUCED, 1).bit_length() - 1
 
 
 class Guides:
-    """The guides of a source's frames. Each frame is read and reduced once while it is kept."""
+    """Makes the guides of a source's frames. Each frame is read and reduced once while it is kept."""
 
     def __init__(self, source: FrameSource) -> None:
         self._source = source
@@ -62,27 +66,28 @@ class Guides:
         self._made: LastValue[np.ndarray] = LastValue()
 
     def keep(self, indices: Iterable[int]) -> None:
-        """Set which frames may be needed from now on, and forget all others."""
+        """Set which source frames may be needed from now on, and forget all others."""
         self._kept = frozenset(indices)
         self._reduced = {i: picture for i, picture in self._reduced.items() if i in self._kept}
         if not self._kept:
             self._made.clear()
 
     def note(self, index: int, frame: Decoded) -> None:
-        """Take a frame that was read for something else, if it is needed."""
+        """Keep a reduced copy of a frame that was read for something else, if a guide will need it."""
         if index in self._kept and index not in self._reduced:
             self._reduced[index] = self._reduce(as_rgba(frame))
 
     def lacking(self, frames: tuple[int, ...]) -> set[int]:
-        """Return the frames that `guide` would read."""
+        """Return those of the frames that `guide` would have to read."""
         return set(frames).difference(self._reduced)
 
     def guide(self, frames: tuple[int, ...], block: int) -> np.ndarray:
         """Return a guide (h, w, 3) float32: display values 0 … 1, times the rows of its cells over ROWS.
 
         Args:
-            frames: those of `guiding`. Any but the first are skipped if they cannot be read.
-            block: the side of its cells in pixels; cells are larger in a large frame, which has no finer detail
+            frames: From `guiding`. Any but the first are skipped if they cannot be read.
+            block: The side in pixels of the blocks that share coefficients. In a large frame, cells are larger, since
+                the guide has no finer detail.
         """
         return self._made.get((frames, block), lambda: self._guide(frames, block))
 
@@ -111,7 +116,7 @@ class Guides:
 
 
 class NotedSource(SourceWrapper):
-    """A source that hands every frame it reads to `guides`."""
+    """A source around another one that also hands every frame that is read to Guides, which then need not read it."""
 
     def __init__(self, source: FrameSource, guides: Guides) -> None:
         super().__init__(source)
@@ -130,7 +135,10 @@ class NotedSource(SourceWrapper):
 
 
 def _averaged(picture: np.ndarray, size: int) -> np.ndarray:
-    """Return means (h, w, 3), 0 … 1, over squares of size × size pixels. The last pixels are repeated at the edges."""
+    """Return means (h, w, 3), 0 … 1, over squares of size × size pixels of a picture (H, W, 3 or 4).
+
+    The last pixels are repeated at the edges.
+    """
     whole = picture.dtype.kind == "u"
     unit = np.float32(size * size * (np.iinfo(picture.dtype).max if whole else 1))
     if size > 1:
@@ -139,13 +147,18 @@ def _averaged(picture: np.ndarray, size: int) -> np.ndarray:
 
 
 def _gaussian(sigma: float) -> np.ndarray:
-    """Return a Gaussian's weights at distances 0, 1, 2, …"""
+    """Return the weights of a Gaussian at distances 0, 1, 2, … cells; `sigma` is its standard deviation."""
     weights = np.exp(-0.5 * (np.arange(round(3 * sigma) + 1) / sigma) ** 2)
     return (weights / (2 * weights.sum() - weights[0])).astype(np.float32)
 
 
 def _steadied(shown: np.ndarray, beside: list[np.ndarray]) -> np.ndarray:
-    """Return the mean (3, h, w) float32 of pictures uint16, weighted by their likeness to `shown`."""
+    """Return the mean (3, h, w) float32 of a picture and others, which count at each pixel by their likeness to it.
+
+    Args:
+        shown: The picture of the shown frame, (3, h, w) uint16.
+        beside: Those of the frames around it.
+    """
     total, weights = shown.astype(np.float32), np.ones(shown.shape[1:], np.float32)
     for other in beside:
         apart = (np.maximum(other, shown) - np.minimum(other, shown)).max(axis=0)

@@ -1,8 +1,8 @@
-"""Frames for the windows of layers: weighted pixel by pixel with a layer's matte, or with what all mattes leave.
+"""Frames for the windows of layers, and the mattes by which they are weighted pixel by pixel.
 
-Also the mattes of layers in source frames, each made once and cached, and the colors of layers and of what lies behind
-them. And plates: what lies behind layers where no exposed frame shows it, taken from other frames or filled from
-around.
+A layer's window has frames times the layer's matte. One more window has the background: frames times what all mattes
+leave. At edges, both get colors of their own (*Clean Edges*). Where no exposed frame shows the background, a plate is
+made: from other frames, or filled from around. Mattes are made once for each source frame, and cached.
 """
 
 from collections.abc import Callable, Hashable, Iterable
@@ -28,7 +28,7 @@ LARGEST = np.finfo(np.float32).max  # the most light
 
 
 class RecentFrames(SourceWrapper):
-    """A source that caches the last frames, since each layer's window reads all of them."""
+    """A source around another one that caches the last frames, since each layer's window reads all of them."""
 
     windows = 1
 
@@ -44,7 +44,7 @@ class RecentFrames(SourceWrapper):
         return self._kept.ask(("decoded", index), lambda: self._source.decoded(index), self.most)
 
     def want(self, indices: Iterable[int]) -> None:
-        """Ignore the hint: the renderer tells the source which frames come next."""
+        """Ignore the announcement: the renderer tells the other source which frames come next."""
 
     def clear(self) -> None:
         """Forget all frames."""
@@ -52,15 +52,15 @@ class RecentFrames(SourceWrapper):
 
 
 class WeightedFrames(SourceWrapper):
-    """Frames in linear light, premultiplied with weights.
+    """A source of frames in linear light, premultiplied with weights: a layer's matte, or what all mattes leave.
 
     Attributes:
-        base: the source of the frames; opaque 8-bit frames become half floats, all others float32
-        weight: returns a frame's weights (H, W) float32, 0 … 1
-        rest: the weights are what layers leave; running sums then hold what layers take
-        alone: only the weights, as alpha
-        colored: alone, but with the frames' colors, which a threshold needs
-        is_summable: whether running sums can be made of them (running_sums.WeightedSums)
+        base: The source of the frames. Opaque 8-bit frames become half floats, all others float32.
+        weight: Returns a frame's weights (H, W) float32, 0 … 1.
+        rest: Whether the weights are what layers leave; running sums then hold what layers take.
+        alone: Whether only the weights are wanted, as alpha.
+        colored: With `alone`, whether the frames' colors are needed all the same, by a threshold.
+        is_summable: Whether running sums can be made of them (running_sums.WeightedSums).
     """
 
     alpha, transfer = "premultiplied", "linear"
@@ -86,7 +86,7 @@ class WeightedFrames(SourceWrapper):
 
 
 def linear(frame: np.ndarray, source: FrameSource) -> np.ndarray:
-    """Return a source's frame (H, W, 4) float32 in linear light, premultiplied."""
+    """Convert a source's frame (H, W, 4) to linear light, float32, premultiplied."""
     if frame.dtype.kind == "u":
         most = np.iinfo(frame.dtype).max
         if source.alpha != "premultiplied":
@@ -104,13 +104,13 @@ def linear(frame: np.ndarray, source: FrameSource) -> np.ndarray:
 
 
 def with_colors(frame: np.ndarray, colors: np.ndarray, where: np.ndarray, source: FrameSource) -> np.ndarray:
-    """Return an opaque source's frame (H, W, 4) with some colors replaced.
+    """Return an opaque source's frame (H, W, 4) with the colors of some pixels replaced.
 
     Args:
-        frame: (H, W, 4)
-        colors: (H, W, 3), in linear light
-        where: (H, W) bool
-        source: the frame's source
+        frame: (H, W, 4), in the source's samples.
+        colors: The new colors (H, W, 3), in linear light.
+        where: Which pixels get them, (H, W) bool.
+        source: The frame's source.
     """
     result, own = frame.copy(), colors[where]
     own = light.to_encoded(own) if source.transfer == "srgb" else own
@@ -122,12 +122,12 @@ def with_colors(frame: np.ndarray, colors: np.ndarray, where: np.ndarray, source
 
 
 class LayerMattes:
-    """The mattes of a source's layers, cached.
+    """Makes the mattes of layers in source frames, and caches them.
 
     Args:
-        source: the footage
-        solve: returns coefficients (N, h, w) float32 of a state (Layers.scribbles) at a source frame
-        reader: reads the values of mattes. None: there are none.
+        source: The footage.
+        solve: Returns the coefficients (N, h, w) float32 of a state (Layers.scribbles) at a source frame.
+        reader: Reads the values of mattes. None: all layers are drawn with strokes.
     """
 
     def __init__(
@@ -143,13 +143,18 @@ class LayerMattes:
         return [self.one(layers, frame, i) for i in range(len(layers.opacities))]
 
     def one(self, layers: Layers, frame: int, layer: int) -> np.ndarray:
-        """Return the matte of one layer."""
+        """Return the matte (H, W) float32, 0 … 1, of the layer with an index in a source frame, times its opacity."""
         return self._whole(layers, frame, layer) * np.float32(layers.opacities[layer])
 
     def edges(self, layers: Layers, frame: int) -> list[np.ndarray]:
-        """Return the mattes whose soft edges mix a subject with what lies behind it, without opacities.
+        """Return the mattes (H, W) float32 at whose soft edges the picture's pixels mix a subject and its background.
 
-        Ramps and drawings have soft edges that are not in the picture: their mattes are 0 here.
+        They are without opacities. Soft edges of ramps and of drawn layers are not in the picture itself: their mattes
+        are 0.
+
+        Args:
+            layers: The layers.
+            frame: The source frame.
         """
         shown = layers.mattes[self._place(layers, frame)]
         tell = [matte is not None and not isinstance(matte.content, Ramp) for matte in shown]
@@ -158,10 +163,11 @@ class LayerMattes:
 
     @staticmethod
     def _place(layers: Layers, frame: int) -> int:
+        """Return the index of a source frame in the lists of `layers`, clamped to the known frames."""
         return min(max(frame - layers.first, 0), len(layers.mattes) - 1)
 
     def _whole(self, layers: Layers, frame: int, layer: int) -> np.ndarray:
-        """Return a matte without its opacity."""
+        """Return the matte (H, W) float32, 0 … 1, of the layer with an index in a source frame, without its opacity."""
         place = self._place(layers, frame)
         drawn, matte = layers.scribbles[place], layers.mattes[place][layer]
         if matte is not None:
@@ -186,11 +192,17 @@ class LayerMattes:
         return _fraction(self._get(key, moved))
 
     def behind(self, layers: Layers, frame: int) -> np.ndarray:
-        """Return how much (H, W) float32 of what lies behind all layers a source frame shows."""
+        """Return how much of the background a source frame shows behind all layers, (H, W) float32, 0 … 1."""
         return layering.behind(self.of(layers, frame))
 
     def _drawn(self, state: FrameState, frame: int, layer: int) -> np.ndarray:
-        """Return the matte of a drawn layer. Unless it follows edges, it does not depend on the frame."""
+        """Return the matte of a layer of strokes. Unless it follows edges, it does not depend on the frame's picture.
+
+        Args:
+            state: The frame's state in Layers.scribbles.
+            frame: The source frame.
+            layer: The layer's index.
+        """
         key = state.key, frame if state.options.edge_aware else None
         if (key, layer) not in self._kept:
             for i, values in enumerate(self._solve(state, frame)[1:]):
@@ -198,12 +210,15 @@ class LayerMattes:
         return self._get((key, layer), lambda: np.zeros(self._size[::-1]))
 
     def _in_pixels(self, coefficients: np.ndarray, block: int) -> np.ndarray:
+        """Return the matte (H, W) for the coefficients (h, w) of a drawn layer in blocks of pixels."""
         values = layering.matte_of(coefficients)
         if block > 1:
             values = values.repeat(block, 0).repeat(block, 1)
         return values[: self._size[1], : self._size[0]]
 
     def _get(self, key: Hashable, make: Callable[[], np.ndarray]) -> np.ndarray:
+        """Return the cached matte of a key as uint16, or make and cache it."""
+
         def made() -> np.ndarray:
             values = np.rint(make() * np.float32(_WHOLE)).astype(np.uint16)
             kept()
@@ -239,10 +254,12 @@ OPEN, TAKEN, FILLED = 0, 1, 2
 
 
 class LayerColors:
-    """Frames with the colors of a layer or of what lies behind, in the source's samples, and their weights.
+    """Gives the frames of the footage with the colors of a layer or of the background, and their weights.
+
+    Frames have the source's samples. A layer is named by its index, and the background behind all layers by −1.
 
     Attributes:
-        layers: those of the last `begin`
+        layers: The layers of the last `begin`.
     """
 
     layers: Layers
@@ -254,27 +271,33 @@ class LayerColors:
         self._kept: RecentValues[tuple, Any] = RecentValues()
 
     def begin(self, layers: Layers, options: Options, shot: range) -> None:
-        """Set layers and options for the next frames. shot: the frames that may show what lies behind."""
+        """Set what the next frames depend on.
+
+        Args:
+            layers: The layers.
+            options: The options of the state.
+            shot: The source frames that may show the background.
+        """
         self.layers, self._options, self._shot = layers, options, shot
         self._kept.clear()
 
     def changes(self, layer: int) -> tuple:
-        """Return a key of what `frames` changes in the source's frames. layer: −1: what lies behind all."""
+        """Return a key of how `frames` changes the source's frames: it is equal if windows can be used again."""
         return self._separates, self._options.plate_reach if layer < 0 and self._uncovers else None
 
     def frames(self, layer: int) -> FrameSource:
-        """Return a source of frames with the colors of a layer, or with −1 of what lies behind all layers."""
+        """Return a source of the footage's frames with the colors of a layer, or of the background (−1)."""
         if layer < 0 and self._uncovers:
             return SourceWrapper(self._source, lambda frame: self._uncovered(frame)[0])
         return SourceWrapper(self._source, partial(self._colors, layer)) if self._separates else self._source
 
     @property
     def has_moments(self) -> bool:
-        """Return whether moments lie between frames with colors of their own."""
+        """Whether moments lie between frames with separated colors, so that they differ from the footage's moments."""
         return self._separates and self._source.step > 1
 
     def weights(self, layer: int) -> Callable[[int], np.ndarray]:
-        """Return a function of a frame: how much (H, W) of a layer it shows, or with −1 of what lies behind all."""
+        """Return a function of a source frame: it gives how much (H, W) of a layer, or the background (−1), is seen."""
         if layer >= 0:
             return lambda frame: self._mattes.one(self.layers, frame, layer)
         if self._uncovers:
@@ -283,17 +306,20 @@ class LayerColors:
 
     @property
     def _separates(self) -> bool:
+        """Whether the colors of layers and background are separated at edges (*Clean Edges*)."""
         return self._options.decontaminate and self._source.alpha == "opaque"
 
     @property
     def _uncovers(self) -> bool:
+        """Whether what layers cover is taken from other frames: the camera moves."""
         return self.layers.camera is not None and self._source.alpha == "opaque"
 
     def _memo(self, frame: int, name: Hashable, make: Callable[[], T]) -> T:
+        """Return the cached value of a frame and a name, or make it."""
         return self._kept.ask((frame, name), make, TOGETHER * (1 + len(self.layers.shutters)))
 
     def _colors(self, layer: int, frame: int) -> Decoded:
-        """Return a frame with a layer's colors, or with −1 of what lies behind all. Moments lie between such frames."""
+        """Return a frame with the colors of a layer, or of the background (−1). Moments lie between two such frames."""
         moment = self._source.decoded(frame)
         if not isinstance(moment, Moment):
             return self._separated(frame, layer)[int(layer < 0)]
@@ -306,11 +332,15 @@ class LayerColors:
         return pair.moment(moment.pair, moment.number, moment.steps)
 
     def _separated(self, frame: int, layer: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return a frame with a layer's colors, and with those behind it. layer: −1: behind all."""
+        """Return a frame (H, W, 4) with a layer's colors, and one with the colors of what lies behind it, cached.
+
+        For −1 these are all layers together, and the background.
+        """
         number = 0 if len(self.layers.shutters) == 1 else layer  # a single layer has all behind it
         return self._memo(frame, number, lambda: self._separate(frame, number))
 
     def _separate(self, frame: int, number: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return what `_separated` returns, not cached."""
         mattes = self._mattes.edges(self.layers, frame)
         matte = 1 - layering.behind(mattes) if number < 0 else mattes[number]
         picture, mixed = as_rgba(self._source.decoded(frame)), (matte > 0) & (matte < 1)
@@ -319,10 +349,11 @@ class LayerColors:
         return own, behind
 
     def _uncovered(self, frame: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return what `_uncover` returns, cached."""
         return self._memo(frame, "behind", lambda: self._uncover(frame))
 
     def _uncover(self, frame: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return a frame of what lies behind layers, and its weights.
+        """Return a frame (H, W, 4) of the background, completed where layers cover it, and its weights (H, W).
 
         What layers cover comes from other frames, moved by the camera: where it pans, the frames that show a place are
         no fair sample of the exposure.
@@ -340,11 +371,11 @@ class LayerColors:
         return with_colors(picture, colors, kinds == TAKEN, self._source), share
 
     def motion(self, frame: int, other: int) -> tuple[complex, complex]:
-        """Return how the camera's view moves from one frame to another."""
+        """Return the camera's motion from one source frame to another: turn and shift (Following.between)."""
         return self.layers.camera.between(frame, other) if self.layers.camera else (1, 0)
 
     def linear_part(self, frame: int, part: tuple[slice, slice]) -> np.ndarray:
-        """Return rows and columns of a frame in linear light, premultiplied."""
+        """Return some rows and columns of a source frame in linear light, premultiplied, (h, w, 4) float32."""
         return linear(self._recent.read(frame)[part], self._source)
 
     def clear(self) -> None:
@@ -353,9 +384,14 @@ class LayerColors:
 
 
 def nearest_frames(index: int, options: Options, shot: range) -> Iterable[int]:
-    """Return the shot's filmed frames in reach of frame `index`, in the order in which a plate uses them.
+    """Return the filmed frames that a plate is made from, in the order in which it tries them.
 
     The nearest come first, of two the earlier one. Moments between them are made of these.
+
+    Args:
+        index: The source frame for which the plate is.
+        options: Of the state; plate_reach sets how far frames may be.
+        shot: The source frames of the shot.
     """
     reach = options.plate_reach * options.step
     near = range(max(index - reach, shot.start), min(index + reach + 1, shot.stop))
@@ -370,17 +406,18 @@ def plate(
     clear: Callable[[int], np.ndarray],
     motion: Callable[[int], tuple[complex, complex]],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return what lies behind layers in the pixels `holes`.
+    """Find out what lies behind layers in some pixels, the holes: take it from frames that show it there.
 
     Args:
-        holes: (H, W) bool
-        frames: source frames, in the order in which they are tried
-        read: returns rows and columns of a frame's picture
-        clear: returns how much (H, W) of what lies behind a frame shows
-        motion: returns where a point z of this picture lies in a frame: turn · z + shift
+        holes: The pixels, (H, W) bool.
+        frames: Source frames, in the order in which they are tried.
+        read: Returns rows and columns of a frame in linear light, premultiplied.
+        clear: Returns how much (H, W) of the background a frame shows.
+        motion: Returns where a point z of this picture lies in a frame, as (turn, shift): at turn · z + shift.
 
     Returns:
-        A picture (H, W, 4) float32, scene-linear and premultiplied, and the kinds (H, W) uint8 of its pixels
+        A picture (H, W, 4) float32, scene-linear and premultiplied, and the kind (H, W) uint8 of each pixel: OPEN (no
+        hole), TAKEN from a frame, or FILLED, which is still to be filled.
     """
     height, width = holes.shape
     picture, kinds = np.zeros((height, width, 4), np.float32), np.where(holes, FILLED, OPEN).astype(np.uint8)
@@ -404,16 +441,16 @@ def plate(
 
 
 def uncovered(colors: np.ndarray, seen: np.ndarray, plate: np.ndarray, kinds: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return what lies behind layers in a frame, completed from a plate.
+    """Return the background in a frame, completed from a plate where layers cover it.
 
     Args:
-        colors: (H, W, 3), what the frame shows, scene-linear
-        seen: (H, W), how much of what lies behind it shows
-        plate: of `plate`, with holes where the frame does not show all
-        kinds: of `plate`
+        colors: (H, W, 3), what the frame shows, scene-linear.
+        seen: (H, W), how much of the background it shows.
+        plate: The picture from `plate`, with holes where the frame does not show all.
+        kinds: The kinds of pixels from `plate`.
 
     Returns:
-        Colors (H, W, 3), scene-linear, and their weights (H, W) float32
+        Colors (H, W, 3), scene-linear, and their weights (H, W) float32.
     """
     taken = kinds == TAKEN
     mixed = seen[..., None] * colors + (1 - seen)[..., None] * plate[..., :3]
@@ -422,14 +459,14 @@ def uncovered(colors: np.ndarray, seen: np.ndarray, plate: np.ndarray, kinds: np
 
 
 def filled(picture: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Fill unknown pixels smoothly from their neighbors.
+    """Return a picture (H, W, C) whose unknown pixels are filled smoothly from their neighbors.
 
     It uses a pyramid: each level is the mean of the known pixels of the finer one, which takes from it what it lacks.
     The result resembles diffusion, with one pass for each level.
 
     Args:
-        picture: (H, W, C) float32
-        known: (H, W) bool
+        picture: (H, W, C) float32.
+        known: (H, W) bool.
     """
     if known.all() or min(known.shape) < 2:
         return picture if known.any() else np.zeros_like(picture)
@@ -445,7 +482,7 @@ def filled(picture: np.ndarray, known: np.ndarray) -> np.ndarray:
 
 
 def _doubled(picture: np.ndarray) -> np.ndarray:
-    """Return the picture at twice its size, linear between the centers of pixels."""
+    """Return a picture (h, w, C) at twice its size, interpolated linearly between the middles of pixels."""
     for axis in (0, 1):
         count = picture.shape[axis]
         own = np.arange(count).repeat(2)

@@ -1,5 +1,7 @@
-"""Pictures with layers: each layer, and what lies behind all, is composed from a separate window. Then they are laid
-over one another (core.pixels.layering)."""
+"""Compose pictures with layers: each layer and the background by themselves, which are then laid over one another.
+
+core/pixels/layering.py has the method. Each of them has a window of its own.
+"""
 
 from collections.abc import Callable, Collection
 from dataclasses import replace
@@ -23,15 +25,15 @@ _SEEN = 1 / 1024
 
 
 class LayeredRenderer:
-    """Composes pictures with layers. It has the layers' windows and mattes.
+    """Composes pictures with layers, and holds the windows and mattes of the layers.
 
     Args:
-        compositor: composes the parts
-        stages: lays them over one another
-        source: the footage
-        guides: take its frames, for the diffusion
-        mattes: reads the values of mattes
-        solve: returns coefficients (N, h, w) float32 of a state (Layers.scribbles) at a frame of a source
+        compositor: Composes each layer and the background.
+        stages: Lays them over one another.
+        source: The footage.
+        guides: The guides of the diffusion, which get the frames that are read here.
+        mattes: Reads the values of mattes. None: all layers are drawn with strokes.
+        solve: Returns the coefficients (N, h, w) float32 of a state (Layers.scribbles) at a frame of a source.
     """
 
     def __init__(
@@ -51,7 +53,7 @@ class LayeredRenderer:
         self._layers: Layers | None = None
         self._windows: dict[tuple, Handle] = {}
         self._loaded: dict[tuple[int, int], tuple] = {}  # keys of frames (f, f), and camera motions (f, g)
-        self._crowd = 1  # the factor of the room that windows leave for one another
+        self._crowd = 1  # a factor of the memory that each window reserves, to leave room for others
 
     @property
     def held(self) -> Collection[int]:
@@ -62,14 +64,14 @@ class LayeredRenderer:
     def draw(
         self, request: Request, behind: Request, coefficients: Coefficients, shot: range, plain: Callable[[], Handle]
     ) -> Handle:
-        """Return the picture, like the compositor's `draw`.
+        """Return a picture with layers on the device, as Compositor.draw does.
 
         Args:
-            request: the picture
-            behind: the request of what lies behind, without layers
-            coefficients: those of `behind`
-            shot: the source frames that windows may show
-            plain: returns the picture without layers
+            request: The picture.
+            behind: The request of the background, without layers.
+            coefficients: Those of `behind`.
+            shot: The source frames that windows may show.
+            plain: Returns the picture without layers, which counts where no layer is in any exposed frame.
         """
         layers = request.state.layers
         assert layers is not None
@@ -92,6 +94,15 @@ class LayeredRenderer:
     def _composed(
         self, request: Request, parts: Parts, coefficients: Coefficients, shot: range, plain: Callable[[], Handle]
     ) -> Handle:
+        """Return the picture of `draw`, which calls this again with smaller windows if it fails.
+
+        Args:
+            request, coefficients, shot, plain: As for `draw`.
+            parts: The requests of the picture's parts.
+
+        Raises:
+            ValueError: A window was freed to make room for others.
+        """
         count = max(layer for layer, _ in parts) + 1
         moves = any(part.state.following is not None for part in parts.values())
         # Without running sums, the picture without layers is composed as well.
@@ -112,6 +123,10 @@ class LayeredRenderer:
         return self._stages.lay(bottom, exposed[1:], request.levels)
 
     def _parts(self, request: Request, behind: Request, layers: Layers) -> Parts:
+        """Return the requests of the parts of a picture: the background (−1) and each layer.
+
+        If frames have alpha, each has a second part, whose alpha is its share of the exposure.
+        """
         states = [behind.state, *(request.state.of([shutter]) for shutter in layers.shutters)]
         parts = {(i, False): replace(behind, state=state) for i, state in enumerate(states, -1)}
         if self._source.alpha != "opaque":
@@ -121,6 +136,13 @@ class LayeredRenderer:
         return parts
 
     def _window(self, name: tuple[int, bool], part: Request, shutters: int) -> Handle:
+        """Return the window of a part, which is made or replaced if it does not fit.
+
+        Args:
+            name: The part, a key of Parts.
+            part: Its request.
+            shutters: The number of shutters of the picture.
+        """
         (layer, alone), moved, options = name, part.state.following is not None, part.state.options
         summed = part.state.averages
         has_threshold = any(combine.threshold is not None for combine in part.state.combines)
@@ -144,7 +166,7 @@ class LayeredRenderer:
                 window.load(ordered[:end], options, shot)
 
     def _forget_changed(self, layers: Layers) -> None:
-        """Release the windows if the mattes of a known frame, the camera's motions, or the layers have changed."""
+        """Release the windows if the layers, their mattes in a known frame, or the camera's motion have changed."""
         # Drawn layers lack their scribbles in moments that this picture does not show.
         known = [
             frame
@@ -164,13 +186,16 @@ class LayeredRenderer:
     def _plate(
         self, request: Request, exposed: list[Exposure], shot: range, gain: Callable[[], np.ndarray]
     ) -> np.ndarray | None:
-        """Return Behind.plate: needed where too little of what lies behind is exposed, and visible.
+        """Return a picture (H, W, 4) of the background for where too little of it is exposed, if it is visible there.
 
         Args:
-            request: the picture
-            exposed: what lies behind, and the layers
-            shot: the source frames that windows may show
-            gain: returns the brightness (H, W) of its pixels
+            request: The picture.
+            exposed: The background, and the layers.
+            shot: The source frames that windows may show.
+            gain: Returns the brightness (H, W) of the background's pixels.
+
+        Returns:
+            Behind.plate; None if it is needed nowhere.
         """
         layers, (bottom, *own) = request.state.layers, exposed
         if layers is None or self._stages.least_share(bottom) >= layering.CLEAR:
@@ -198,11 +223,11 @@ class LayeredRenderer:
         return picture
 
     def _shares(self, exposed: Exposure) -> np.ndarray:
-        """Return the shares (H, W) of an exposure."""
+        """Return the share (H, W) of the exposure that shows a layer, or the background."""
         return self._compositor.read(exposed.share)[..., 3]
 
     def _gain(self, state: FrameState, coefficients: Coefficients) -> np.ndarray:
-        """Return the brightness (H, W) or (1, 1) of what lies behind."""
+        """Return the brightness (H, W) or (1, 1) of the background's pixels, which differs with weighted exposure."""
         if (state.gains == 1).all():
             return np.ones((1, 1))
         values = np.maximum(self._compositor.coefficients(coefficients.handle, len(state.bars)), 0)
@@ -211,7 +236,7 @@ class LayeredRenderer:
         return whole[: self._source.height, : self._source.width]
 
     def release_windows(self) -> None:
-        """Free the windows' frames. The next picture reads them again."""
+        """Free the windows and the frames in them. The next picture reads them again."""
         for window in self._windows.values():
             window.release()
         self._windows.clear()
@@ -219,7 +244,7 @@ class LayeredRenderer:
         self._colors.clear()
 
     def release(self) -> None:
-        """Free all memory on the device and all cached frames."""
+        """Free all memory on the device, and all cached frames."""
         self.release_windows()
         self.recent.clear()
 

@@ -1,4 +1,8 @@
-"""Renders pictures of a source in four stages: labels, window, coefficients, composition (Renderer.draw)."""
+"""Render pictures of an effect in four stages: labels, window, coefficients, composition (Renderer.draw).
+
+Labels say which shutter is drawn on which pixel, the window holds the frames that can be exposed, and coefficients say
+how much of each shutter a pixel gets. Composition sums the frames of each pixel.
+"""
 
 from __future__ import annotations
 
@@ -30,19 +34,26 @@ _AHEAD, _DECODED, _DECODED_BYTES = 4, 8, 256 << 20
 
 
 def open_compositor(device: str = "gpu") -> Compositor:
-    """Return the compositor "gpu" (OpenGL 4.3) or "cpu" (NumPy).
+    """Return what composes pictures, on a GPU or with NumPy.
+
+    Args:
+        device: "gpu" (OpenGL 4.3) or "cpu" (NumPy).
 
     Raises:
-        NoDeviceError: there is no OpenGL 4.3
+        NoDeviceError: There is no OpenGL 4.3.
     """
     return CPUCompositor() if device == "cpu" else GPUCompositor(open_gl())
 
 
 def open_gl(budget: Budget | None = None, ask_others: Callable[[], None] | None = None) -> GLDevice:
-    """Return a device on a new OpenGL 4.3 context. budget, ask_others: as for Device.
+    """Return a device on a new OpenGL 4.3 context.
+
+    Args:
+        budget: The memory that it shares with other devices on the GPU. None: one of its own.
+        ask_others: Called when the budget is full; makes other devices free memory.
 
     Raises:
-        NoDeviceError: OpenGL 4.3 or moderngl is missing
+        NoDeviceError: OpenGL 4.3 or moderngl is missing.
     """
     try:
         from .devices.gl import GLDevice
@@ -52,13 +63,14 @@ def open_gl(budget: Budget | None = None, ask_others: Callable[[], None] | None 
 
 
 class LabelLayer(NamedTuple):
-    """Labels that make a share of the coefficients.
+    """Labels from which a share of a picture's coefficients is diffused. Opacities of scribbles need several of these.
 
     Attributes:
-        share: the share
-        labels: (h, w) uint16, a label for each block of Options.aggregate pixels a side: 0 free, 1 + shutter scribbled
-        sole: the only shutter of the whole picture. None: there are several.
-        key: equal for equal labels and shares
+        share: The share, 0 to 1; those of all LabelLayers sum to 1 (scribbles.layers).
+        labels: (h, w) uint16, one for each block of Options.aggregate pixels a side: 0 where nothing is drawn, 1 +
+            shutter where that shutter is drawn.
+        sole: The index of the shutter that all pixels get, if there is only one. None: there are several.
+        key: A hashable value that is equal for equal labels and shares.
     """
 
     share: float
@@ -68,12 +80,13 @@ class LabelLayer(NamedTuple):
 
 
 class Renderer:
-    """Renders pictures of a source. It keeps the window's frames and the last result of each stage.
+    """Renders pictures of a source. For the next picture, it keeps the window's frames and each stage's last result.
 
     Attributes:
-        compositor: composes the pictures
-        source: the footage
-        is_short: whether the device had no room for the last window, so that each picture sends all frames (slow)
+        compositor: Composes the pictures.
+        source: The footage.
+        is_short: Whether the device had no room for the last window, so that each picture sends all frames, which is
+            slow.
     """
 
     def __init__(self, compositor: Compositor, source: FrameSource, mattes: MatteReader | None = None) -> None:
@@ -91,10 +104,10 @@ class Renderer:
         self._kept_picture: LastValue[Handle] = LastValue()
 
     def picture(self, request: Request) -> np.ndarray:
-        """Return the picture (H, W, 4), top row first: scene-linear float32, premultiplied.
+        """Return the picture (H, W, 4) of a request, top row first: scene-linear float32, premultiplied.
 
-        With `levels`: 8-bit sRGB over black with full alpha, as in a movie with Blender's view transform Standard. With
-        a display: its levels.
+        If request.levels is true, it is 8-bit sRGB over black with full alpha, as in a movie with Blender's view
+        transform Standard. If the request has a display, it is that display's levels.
         """
         with self.compositor.current():
             if request.display is not None:
@@ -104,15 +117,16 @@ class Renderer:
             return self.compositor.read(self.draw(request))
 
     def draw(self, request: Request) -> Handle:
-        """Return the picture on the device (GPUCompositor.draw), or with NumPy an array.
+        """Return the picture of a request on the device (GPUCompositor.draw), or with NumPy as an array.
 
-        It is valid until the renderer's next picture. The last picture is not composed again.
+        It is valid until the renderer's next picture. The same picture is not composed again.
         """
         if request.state.layers is None and (self._window is None or not self._window.is_open):
             self._kept_picture.clear()
         return self._kept_picture.get(request.key, lambda: self._composed(request), quick=request.quick)
 
     def _composed(self, request: Request) -> Handle:
+        """Return the picture of a request from all stages, and announce to the source which frames come next."""
         wanted_later = self._want(request)
         request = self.slid(request)
         with self.compositor.current():
@@ -121,6 +135,7 @@ class Renderer:
         return drawn
 
     def _plain(self, request: Request) -> Handle:
+        """Return the picture of a request without layers."""
         labels = self.labels(request)
         # The window comes before the coefficients, because it reads the frames that guide the diffusion.
         window = self._loaded_window(request, labels)
@@ -128,7 +143,7 @@ class Renderer:
         return self.compositor.draw(window, self._exposing(request, labels), coefficients)
 
     def _with_layers(self, request: Request) -> Handle:
-        """Return the picture whose layers, and what lies behind them, are exposed separately."""
+        """Return the picture of a request whose layers, and the background behind them, are exposed separately."""
         behind = replace(request, state=replace(request.state, layers=None), levels=False)
         labels, shot = self.labels(behind), self.shot(request)
         self._keep_guides(request)
@@ -136,6 +151,7 @@ class Renderer:
         return self._layering().draw(request, exposing, coefficients, shot, lambda: self._plain(behind))
 
     def _layering(self) -> LayeredRenderer:
+        """Return the LayeredRenderer, which composes pictures with layers. It is made when it is first needed."""
         if self._layered is None:
             mattes = self._mattes and self._mattes.another()
             self._layered = LayeredRenderer(
@@ -144,13 +160,24 @@ class Renderer:
         return self._layered
 
     def _solved_apart(self, source: FrameSource, state: FrameState, index: int) -> np.ndarray:
-        """Return coefficients (N, h, w) float32 of a layer's scribbles at any frame."""
+        """Return the coefficients (N, h, w) float32 from which the mattes of drawn layers are made.
+
+        A second renderer solves for them, so that this one keeps its own results.
+
+        Args:
+            source: The footage.
+            state: A state of Layers.scribbles.
+            index: The source frame.
+        """
         if self._scribbles is None:
             self._scribbles = Renderer(self.compositor, source)
         return self._scribbles.coefficients(Request(index, state))
 
     def coefficients(self, request: Request) -> np.ndarray:
-        """Return the picture's coefficients (N, h, w) float32, a value for each block of Options.aggregate pixels."""
+        """Return how much of each shutter a pixel gets, without layers: (N, h, w) float32.
+
+        There is a value for each block of Options.aggregate pixels a side.
+        """
         self._want(request)  # the picture will read these frames as well
         count, (width, height) = len(request.state.bars), grid(self.source, request.state)
         drawn = self.drawn_coefficients(request)
@@ -158,13 +185,19 @@ class Renderer:
             return np.broadcast_to(self.compositor.coefficients(drawn.handle, count), (count, height, width))
 
     def drawn_coefficients(self, request: Request) -> Coefficients:
-        """Return the coefficients of all shutters on the device, valid until the next call of any method."""
+        """Return how much of each shutter a pixel gets (coefficients), without layers, on the device.
+
+        They are valid until the next call of any method.
+        """
         labels = self.labels(request)
         with self.compositor.current():
             return self._coefficients(request, labels, len(request.state.bars))
 
     def coefficients_with_layers(self, request: Request) -> np.ndarray:
-        """Return coefficients (N, H, W) of each pixel, with the shutters of layers laid over."""
+        """Return how much of each shutter a pixel gets: (N, H, W) float32, with the mattes of layers laid over.
+
+        Each layer counts with its shutter.
+        """
         block = request.state.options.aggregate
         whole = self.coefficients(request).repeat(block, 1).repeat(block, 2)
         values = np.maximum(whole[:, : self.source.height, : self.source.width], 0)
@@ -176,7 +209,10 @@ class Renderer:
         return values.astype(np.float32)
 
     def drawn_with_layers(self, request: Request) -> Coefficients:
-        """Return drawn_coefficients with the shutters of layers laid over."""
+        """Return how much of each shutter a pixel gets, with the mattes of layers laid over, on the device.
+
+        They are valid until the next call of any method.
+        """
         if request.state.layers is None:
             return self.drawn_coefficients(request)
         values = self.coefficients_with_layers(request)
@@ -184,24 +220,26 @@ class Renderer:
             return Coefficients(self._stages.upload(values), 1)
 
     def drawn_labels(self, request: Request) -> tuple[Handle, int]:
-        """Return the labels of the first layer on a GPU: a texture array r32ui, top row first, and its block size.
+        """Return which shutter is drawn on which pixel (labels), as a GPU texture for the preview, and their block.
 
-        They are valid until the next call of any method.
+        The texture array is r32ui, top row first, and valid until the next call of any method. One label is for block ×
+        block pixels.
         """
         with self.compositor.current():
             return self.compositor.labels(self.labels(request)[0].labels), request.state.options.aggregate
 
     def labels(self, request: Request) -> list[LabelLayer]:
-        """Return labels of the request's scribbles, for each of scribbles.layers."""
+        """Return which shutter is drawn on which pixel of a picture: the LabelLayers of its scribbles."""
         state, size = request.state, grid(self.source, request.state)
         return self._kept_labels.get((size, state.options.border, state.shapes_key), lambda: labelled(state, size))
 
     def shot(self, request: Request, *, known: bool = False) -> range:
         """Return the source frames that the window may show: those of the shot around the shown one.
 
-        It looks only for those ends of the shot that the window reaches; the clip's ends take the place of others.
+        Cuts are looked for only as far as the window reaches. Beyond, the shot goes on to the clip's start or end.
 
         Args:
+            request: The picture.
             known: Read no frame to look for cuts; only cuts that were found before count.
         """
         index, (low, high), shots = request.index, self._reach(request), self.source.shots
@@ -220,7 +258,12 @@ class Renderer:
         return shot
 
     def slid(self, request: Request, *, known: bool = False) -> Request:
-        """Return the request with its exposure moved into the shot (edges "slide"), and edges "hold"."""
+        """Return the request with its exposures moved into the shot and edges "hold", if its edges are "slide".
+
+        Args:
+            request: The request.
+            known: As for `shot`.
+        """
         if request.state.options.edges != "slide":
             return request
         state = windows.slid(request.state, request.index, request.direction, self.shot(request, known=known))
@@ -245,17 +288,22 @@ class Renderer:
         return (missing | unread) - handed
 
     def layer_mattes(self, request: Request, frame: int | None = None) -> list[np.ndarray]:
-        """Return the layers' mattes (H, W) float32, times their opacities. frame: None: the request's."""
+        """Return the mattes (H, W) float32 of a request's layers, times their opacities; none without layers.
+
+        Args:
+            request: The request.
+            frame: The source frame. None: the shown one.
+        """
         if request.state.layers is None:
             return []
         with self.compositor.current():
             return self._layering().mattes.of(request.state.layers, request.index if frame is None else frame)
 
     def _want(self, request: Request) -> list[int]:
-        """Have the frames decoded that a picture lacks, then those of the next pictures.
+        """Have the source decode the frames that a picture lacks, then those of the next pictures.
 
         Returns:
-            The frames to be wanted once the picture is made; the others are on the device by then.
+            The frames to announce once the picture is made; the others are on the device by then.
         """
         indices = (request.index + step * request.direction * self.source.step for step in range(_AHEAD + 1))
         shown = (min(max(index, 0), self.source.count - 1) for index in indices)
@@ -264,28 +312,37 @@ class Renderer:
         return _in_order(self.source, [frames - lacking[0] for frames in lacking[1:]])
 
     def _is_guided(self, request: Request) -> bool:
-        """Return whether coefficients depend on the shown frame."""
+        """Return whether the shown frame's picture counts for how much of each shutter a pixel gets.
+
+        It does if scribbles stop at its edges, and do not give one shutter to all pixels.
+        """
         return request.state.options.edge_aware > 0 and sole_of(self.labels(request)) is None
 
     def _reach(self, request: Request) -> tuple[int, int]:
-        """Return the first and last position that any shutter exposes, that is shown, or that guides the diffusion."""
+        """Return the lowest and highest position (windows.positions) that the picture needs.
+
+        That is for exposures, for the shown frame, and for the frames that guide the diffusion.
+        """
         low, high = windows.reach(request.state, request.index, request.direction)
         beside = guide.reach(request.state.options.step) if self._is_guided(request) else 0
         return min(low, request.index - beside), max(high, request.index + beside)
 
     def _guiding(self, request: Request, shot: range) -> tuple[int, ...]:
-        """Return the source frames that guide the diffusion (guide.guiding); none if nothing does."""
+        """Return the source frames that guide the diffusion (guide.guiding); none if nothing guides it."""
         if not self._is_guided(request):
             return ()
         return guide.guiding(request.index, request.state.options.step, shot)
 
     def _exposing(self, request: Request, labels: list[LabelLayer]) -> Request:
-        """Return the request with only the shutter that holds everywhere, if there is one."""
+        """Return the request with only one shutter if all pixels get that one, else the request itself.
+
+        Frames that only other shutters would expose are then not read.
+        """
         sole = _sole(request, labels)
         return request if sole is None else replace(request, state=request.state.of([sole]))
 
     def _loaded_window(self, request: Request, labels: list[LabelLayer]) -> Handle:
-        """Return the window with all exposed frames loaded."""
+        """Return the window with all frames that a picture exposes. A new one is made if the last does not suit."""
         kind = self._kind_for(request)
         if self._window is None or self._kind != kind or not self._window.is_open:
             self._drop_window()
@@ -300,11 +357,11 @@ class Renderer:
         return self._window
 
     def _kind_for(self, request: Request) -> tuple[int, bool, int, bool]:
-        """Return what the window has to be like, as arguments of Compositor.window.
+        """Return what kind of window a picture needs, as arguments of Compositor.window.
 
         Returns:
-            Its length in frames, whether its pictures have following exposures, the number of shutters, and whether
-            sums of frames are enough.
+            Its length in frames, whether exposures follow something, the number of shutters, and whether all of these
+            average frames, so that sums suffice.
         """
         exposing = self._exposing(request, self.labels(request)).state
         return request.state.options.window, exposing.following is not None, len(request.state.bars), exposing.averages
@@ -320,17 +377,27 @@ class Renderer:
             self._guides.keep(i for i in onwards if i % step == 0 or i == index)
 
     def _coefficients(self, request: Request, labels: list[LabelLayer], count: int = 1) -> Coefficients:
-        """Return coefficients for the composition. count: the shutters, if a single one holds everywhere."""
+        """Return how much of each shutter a pixel gets (coefficients), on the device, from strokes and mattes.
+
+        Args:
+            request: The picture.
+            labels: Of its scribbles.
+            count: If all pixels get one shutter: the number of shutters among which it counts. 1: that one alone, as
+                for `_exposing`.
+        """
         if (sole := _sole(request, labels)) is not None:
             return self._constant(np.eye(count)[sole if count > 1 else 0])
         return Coefficients(self._with_mattes(request, labels), request.state.options.aggregate)
 
     def _constant(self, values: np.ndarray) -> Coefficients:
-        """Return one set of coefficients (N,), in a block that covers the whole picture."""
+        """Return one set of coefficients (N,) for all pixels, on the device: a block that covers the picture."""
         return Coefficients(self._stages.upload(values[:, None, None]), max(self.source.width, self.source.height))
 
     def _with_mattes(self, request: Request, labels: list[LabelLayer]) -> Handle:
-        """Return coefficients on the device, with mattes laid over those of scribbles. Kept until either changes."""
+        """Return how much of each shutter a pixel gets, from strokes with mattes laid over, on the device.
+
+        These coefficients are kept until either changes.
+        """
         state = request.state
         if not state.mattes or self._mattes is None:
             return self._diffused(request, labels)
@@ -344,9 +411,10 @@ class Renderer:
         return self._kept_mattes.get(key, lambda: self._stages.blend(beneath, state.mattes, values))
 
     def _diffused(self, request: Request, labels: list[LabelLayer]) -> Handle:
-        """Return the scribbles' coefficients on the device.
+        """Return how much of each shutter a pixel gets, as it spreads from drawn strokes, on the device.
 
-        They are kept until labels or guides change, or until a solution is needed that is not quick.
+        These coefficients are kept until labels or guides change, or until a request that is not quick needs an exact
+        solution.
         """
         options, count = request.state.options, len(request.state.bars)
         frames = self._guiding(request, self.shot(request)) if options.edge_aware else ()
@@ -360,7 +428,14 @@ class Renderer:
         return self._kept_diffusion.get(key, solve, quick=request.quick)
 
     def _solved_layers(self, layers: list[LabelLayer], count: int, guided: tuple, quick: bool) -> Handle:
-        """Return the sum of all layers' coefficients. Several are never warm: one would depend on another."""
+        """Return the sum of the coefficients that are diffused from each LabelLayer, times its share.
+
+        Args:
+            layers: The LabelLayers.
+            count: The number of shutters.
+            guided: The guide and its strength, or nothing.
+            quick: Whether the solve may start from the last solution. Several never do: one would start from another's.
+        """
         if len(layers) == 1:
             return self._stages.solve(layers[0].labels, count, *guided, warm=quick)
         mixed: Handle = None
@@ -374,6 +449,7 @@ class Renderer:
         return mixed
 
     def _drop_window(self) -> None:
+        """Free the window."""
         if self._window is not None:
             self._window.release()
             self._window = None
@@ -381,7 +457,7 @@ class Renderer:
             self._kept_picture.clear()
 
     def release(self) -> None:
-        """Free all memory on the device, and the frames of the search for cuts. The next picture reads them again."""
+        """Free all memory on the device, and frames kept from the search for cuts. They are read again when needed."""
         with self.compositor.freeing():
             self._drop_window()
             self._stages.release()
@@ -395,7 +471,7 @@ class Renderer:
             self.source.shots.release()
 
     def close(self) -> None:
-        """Free all memory on the device, and close the source."""
+        """Free all memory on the device, and close the source and the files of mattes."""
         self.release()
         for reader in (self._mattes, self._layered):
             if reader is not None:
@@ -404,18 +480,19 @@ class Renderer:
 
 
 def _in_order(source: FrameSource, lacking: list[set[int]]) -> list[int]:
+    """Return the frames that pictures lack, picture by picture, as many as may be decoded in advance."""
     wanted = dict.fromkeys(i for frames in lacking for i in sorted(frames))
     most = _DECODED_BYTES // (source.width * source.height * 4 * source.dtype.itemsize)
     return list(wanted)[: max(_DECODED, most)]
 
 
 def _sole(request: Request, labels: list[LabelLayer]) -> int | None:
-    """Return the only shutter of the picture, or None if there are several or mattes."""
+    """Return the index of the shutter that all pixels get, or None if there are several shutters or any mattes."""
     return None if request.state.mattes else sole_of(labels)
 
 
 def labelled(state: FrameState, size: tuple[int, int]) -> list[LabelLayer]:
-    """Return the labels of each of scribbles.layers. size: (w, h) of the labels."""
+    """Return the LabelLayers of a state's scribbles, one for each of scribbles.layers. `size`: (w, h) of the labels."""
     return [
         _layer(share, scribbles.rasterise(shapes, *size, border=state.options.border))
         for share, shapes in scribbles.layers(state.shapes)
@@ -423,18 +500,22 @@ def labelled(state: FrameState, size: tuple[int, int]) -> list[LabelLayer]:
 
 
 def grid(source: FrameSource, state: FrameState) -> tuple[int, int]:
-    """Return the size (w, h) of a source's labels and coefficients."""
+    """Return the size (w, h) of the labels and coefficients for pictures of a source.
+
+    There is one for each block of Options.aggregate pixels a side.
+    """
     block = state.options.aggregate
     return -(-source.width // block), -(-source.height // block)
 
 
 def sole_of(layers: list[LabelLayer]) -> int | None:
-    """Return the only shutter of all layers, or None."""
+    """Return the index of the shutter that all pixels get from all LabelLayers, or None if there are several."""
     first, *others = layers
     return first.sole if all(layer.sole == first.sole for layer in others) else None
 
 
 def _layer(share: float, labels: np.ndarray) -> LabelLayer:
+    """Return the LabelLayer of labels (h, w) uint16 that count with a share. Find its only shutter and its key."""
     digest = hashlib.blake2b(np.ascontiguousarray(labels), digest_size=16).digest()
     highest = int(labels.max())
     sole: int | None = 0  # without scribbles, the first shutter holds everywhere

@@ -1,4 +1,7 @@
-"""Running sums along time on a device: which sums a window holds, and which ones it makes when it moves."""
+"""Running sums of frames along time on a device, by which a long exposure costs no more than a short one.
+
+The sum of any successive frames is the difference of two running sums. When a window moves by a frame, one sum is made.
+"""
 
 from __future__ import annotations
 
@@ -24,30 +27,39 @@ STORED_SUMS = ("rgba16ui", "rgba32ui", "rgba32ui")
 
 
 def accumulation(decode: int, sent: str, back: bool, tiled: bool, cover: int = 0, kind: int = 1) -> Pass:
-    """Return the pass that makes a layer of sums from its neighbor, by adding or subtracting the frame between the two.
+    """Return the pass that makes a running sum from the one beside it, by adding or subtracting the frame in between.
 
     Args:
-        decode: of `decoding`
-        sent: how the frame was sent: "COLOURS", "NUMBERS" (Device.send), "PLANES" or "MOMENT". "AGAIN": it is the
-            difference of two layers that hold it already.
-        back: whether it is subtracted
-        tiled: whether sums are stored in tiles
-        cover: of WeightedSums
-        kind: MOMENT of the shader, for moments
+        decode: From `decoding`.
+        sent: How the frame was sent: "COLOURS", "NUMBERS" (Device.send), "PLANES" or "MOMENT". "AGAIN": it is the
+            difference of two sums that are there already.
+        back: Whether it is subtracted.
+        tiled: Whether sums are stored in tiles.
+        cover: Which weights frames have: 0 none, 1 those of a layer, 2 those of the background behind layers.
+        kind: MOMENT of the shader, for moments.
     """
     macros = {"DECODE": decode, "BACK": int(back), "TILED": int(tiled), "COVER": cover, sent: kind}
     return read_pass("accumulate", STORED=STORED_SUMS[cover], **macros)
 
 
 def _in_fours(plane: np.ndarray) -> np.ndarray:
-    """Return samples uint8 (h, w) as uint32 (h, ⌈w/4⌉), four side by side."""
+    """Return samples uint8 (h, w) as uint32 (h, ⌈w/4⌉), each of four samples side by side."""
     if missing := -plane.shape[1] % 4:
         plane = np.pad(plane, ((0, 0), (0, missing)))
     return np.ascontiguousarray(plane).view(np.dtype("<u4"))
 
 
 def _by_level(moment: Moment, part: Part, given: Given) -> Iterator[tuple[int, tuple[int, int], Given]]:
-    """Yield, for each level of a part's tiles: MOMENT of the shader, the extent of the pass, and its arguments."""
+    """Yield what passes are needed to add a moment to a part of the window: one for each number of key moments.
+
+    Args:
+        moment: The moment, whose tiles have different numbers of key moments (Moment.levels).
+        part: The part of the window.
+        given: The arguments that all passes have.
+
+    Yields:
+        MOMENT of the shader, the extent of the pass, and its arguments.
+    """
     (across, down), listed = TILE, 0
     rows = part.top // down, -(-(part.top + part.height) // down)
     for level in range(int(moment.levels.max()) + 1):
@@ -62,7 +74,7 @@ def _by_level(moment: Moment, part: Part, given: Given) -> Iterator[tuple[int, t
 
 
 class Sums(Window):
-    """A window of running sums of opaque 8-bit frames, in the light that is summed (Options.light).
+    """A window of running sums of opaque 8-bit frames: the light of successive frames is the difference of two sums.
 
     Textures are rgba16ui: three fields of 21 bits for each pixel. Layer p mod `layers` holds the sum at position p, for
     the positions from `start` to `stop`, both included: the light of all frames before p, counted from an arbitrary
@@ -73,8 +85,9 @@ class Sums(Window):
     differences are exact, whatever the window held before.
 
     Attributes:
-        whole: the value of white in a field
-        tiled: whether pixels are stored tile by tile, in TILE
+        start, stop: The positions of the first and the last sum.
+        whole: The value of white in a field, in the light that is summed (Options.light).
+        tiled: Whether pixels are stored tile by tile, in TILE.
     """
 
     def __init__(self, device: Device, source: FrameSource, capacity: int, shutters: int = 1) -> None:
@@ -99,12 +112,12 @@ class Sums(Window):
         return self._frames.values()
 
     def load(self, positions: np.ndarray, options: Options, shot: range) -> None:
-        """Read the frames at these positions that are not loaded.
+        """Read the frames at some positions that are not loaded, and sum them.
 
         Args:
-            positions: of core.model.windows.positions; the first and the last are less than `capacity` apart
-            options: those of the picture
-            shot: the source frames that the window may show (core.model.windows.source_frames)
+            positions: From core.model.windows.positions; the first and the last are less than `capacity` apart.
+            options: Those of the picture.
+            shot: The source frames that the window may show (core.model.windows.source_frames).
         """
         self.device.use(self.release)
         self.shot = shot
@@ -123,9 +136,9 @@ class Sums(Window):
             self.start -= 1
 
     def _continues(self, first: int, frames: list[int], options: Options) -> bool:
-        """Return whether the sums can move to the positions from `first` on, which show `frames`.
+        """Return whether the present sums are of use for the positions from `first` on, which show `frames`.
 
-        They can if both ranges meet or overlap, and show the same frames where they overlap.
+        They are if both ranges meet or overlap, and show the same frames where they overlap.
         """
         last = first + len(frames)
         overlap = range(max(first, self.start), min(last, self.stop))
@@ -137,12 +150,12 @@ class Sums(Window):
         )
 
     def _keep(self, start: int, stop: int) -> None:
-        """Give up all positions but those from `start` to `stop`."""
+        """Give up all sums but those from position `start` to `stop`."""
         self.start, self.stop = start, stop
         self._frames = {position: frame for position, frame in self._frames.items() if start <= position < stop}
 
     def _together(self, frames: list[int]) -> list[int]:
-        """Return those of the next source frames that one pass may add: moments of a pair, one after another."""
+        """Return those of the next source frames that one pass may add: one, or successive moments of a pair."""
         step, first = self.source.step, frames[0]
         pair = range(first, first - first % step + step)
         if self.cover or first % step == 0 or any(frame in pair for frame in self.held):
@@ -150,16 +163,16 @@ class Sums(Window):
         return [frame for frame, wanted in zip(frames, pair, strict=False) if frame == wanted]
 
     def _add(self, light: Light, frames: list[int], known: int, next_: int) -> int:
-        """Make the sum at a position, from its neighbor and the source frame between the two.
+        """Make the sum at a position, from the one beside it and the source frame between the two.
 
         Args:
-            light: what is summed
-            frames: that frame, and the next ones, which are added as well if they are moments
-            known: the neighbor's position
-            next_: the position
+            light: What is summed (Options.light).
+            frames: That frame, and the next ones, which are added as well if they are moments.
+            known: The position of the sum beside it.
+            next_: The position.
 
         Returns:
-            The number of sums that were made
+            The number of sums that were made.
         """
         frame = frames[0]
         # A position that shows this frame already: it need not be read.
@@ -194,10 +207,10 @@ class Sums(Window):
         return across * down * self.layers, -(-self.source.width // across), -(-part.height // down)
 
     def _send(self, frames: list[int]) -> tuple[str, Given]:
-        """Send a source frame, and the next ones if they are moments.
+        """Send a source frame to the device, and the next ones if they are moments of the same pair.
 
         Returns:
-            How it was sent (`accumulation`), and the arguments of the pass that adds it
+            How it was sent (`accumulation`), and the arguments of the pass that adds it.
         """
         frame = self.source.decoded(frames[0])
         if isinstance(frame, Planes) and self.device.takes_planes:
@@ -209,6 +222,7 @@ class Sums(Window):
         return "COLOURS" if sent is own else "NUMBERS", {"textures": {"frame": sent}}
 
     def _send_planes(self, frame: Planes) -> Given:
+        """Send the planes of a frame, and return the arguments of the pass that adds it."""
         luma = self._extra.filled("luma", [_in_fours(frame.luma)], "r32ui")
         chroma = self._extra.filled("chroma", [_in_fours(plane) for plane in frame.chroma], "r32ui")
         matrix = frame.matrix
@@ -222,6 +236,7 @@ class Sums(Window):
         }
 
     def _send_moments(self, moments: list[Moment]) -> Given:
+        """Send what moments of one pair are made from, and return the arguments of the pass that adds them."""
         first = moments[0]
         layers, height, width, _ = first.vectors.shape
         vectors = self._extra.of("vectors", (width, height, layers), "rgba16")
@@ -247,7 +262,7 @@ class Sums(Window):
         }
 
     def _evenly(self, moment: Moment, indices: list[int]) -> Iterator[Moment]:
-        """Yield those of the next source frames that are moments of the same pair, as far apart as its steps."""
+        """Yield those of the next source frames that are moments of the same pair, one step apart each."""
         for number, index in enumerate(indices, moment.number + 1):
             frame = self.source.decoded(index)
             if not isinstance(frame, Moment) or (frame.pair, frame.number) != (moment.pair, number):
@@ -255,7 +270,7 @@ class Sums(Window):
             yield frame
 
     def _filmed(self, moment: Moment) -> tuple[Texture, int]:
-        """Return the two frames of a moment on the device, and the layer of the first.
+        """Return the two filmed frames that a moment is made from, on the device, and the layer of the first.
 
         Both stay for all moments of their pair, and one of them for the next pair.
         """
@@ -275,7 +290,7 @@ class Sums(Window):
 
 
 class WeightedSums(Sums):
-    """A window of running sums of weights and of opaque 8-bit frames times these, for layers (core.pixels.layering).
+    """A window of running sums for layers (core.pixels.layering): of weights, and of opaque 8-bit frames times weights.
 
     Textures are rgba32ui: four fields of 32 bits. Where the weights are 1, pictures have the bits of Sums.
     """

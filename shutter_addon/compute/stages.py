@@ -1,5 +1,7 @@
-"""The stages of a picture on a device besides its composition: coefficients are diffused, added and covered by mattes;
-layers are laid over one another."""
+"""The stages of a picture on a device besides its composition: make coefficients, and lay layers over one another.
+
+Coefficients are diffused from strokes, added up, and covered by mattes.
+"""
 
 from collections.abc import Hashable, Sequence
 from typing import Any
@@ -22,7 +24,7 @@ LEAST = read_pass("layer", "LEAST")
 
 
 class Stages:
-    """request.Stages on a Device."""
+    """Makes coefficients, and lays layers over one another, on a device (request.Stages)."""
 
     def __init__(self, device: Device) -> None:
         self._device = device
@@ -32,7 +34,11 @@ class Stages:
         self._held: dict[int, Hashable] = {}  # {layer of _mattes: key of the values in it}
 
     def solve(self, labels: np.ndarray, count: int, *guided: Any, warm: bool = False) -> Texture:
-        """See request.Stages. The memory of the other kind of diffusion is freed."""
+        """Return how much of each shutter a pixel gets (coefficients), diffused from labels, as a texture.
+
+        See request.Stages.solve. There are two kinds of diffusion, with and without a guide; the memory of the other is
+        freed.
+        """
         if guided and 0 < np.count_nonzero(labels) < labels.size:  # else nothing is diffused
             self._plain.release()
             return self._edged.solve(labels, count, *guided)
@@ -40,13 +46,13 @@ class Stages:
         return self._plain.solve(labels, count, warm=warm)
 
     def upload(self, values: np.ndarray) -> Texture:
-        """See request.Stages."""
+        """Send coefficients (N, h, w), or (N, 1, 1) for the whole picture, to the device: return them as a texture."""
         name = "constant" if values.shape[1:] == (1, 1) else "uploaded"
         fours = np.moveaxis(padded(np.moveaxis(values, 0, -1)), 2, 0)  # layers (⌈N/4⌉, h, w, 4)
         return self._textures.filled(name, fours.astype(np.float32))
 
     def add(self, mixed: Texture | None, added: Texture, share: float, size: tuple[int, int]) -> Texture:
-        """See request.Stages."""
+        """Add a share of some coefficients to the sum so far, and return the new sum (request.Stages.add)."""
         height, width = size
         result = self._textures.of("sum", (width, height, added.size[2]), "rgba32f")
         whole = self._textures.filled("share", [np.full((1, 1, 1), share, np.float32)], "r32f")
@@ -59,7 +65,10 @@ class Stages:
     def blend(
         self, beneath: Texture, mattes: tuple[Matte, ...], layers: Sequence[tuple[Hashable, np.ndarray]]
     ) -> Texture:
-        """See request.Stages. The last values stay on the device."""
+        """Lay mattes over coefficients, and return the new coefficients (request.Stages.blend).
+
+        The last values of mattes stay on the device, and are not sent again.
+        """
         height, width = layers[0][1].shape
         values = self._textures.of("mattes", (width, height, min(len(mattes), MOST_MATTES)), "r32f")
         if values is not self._mattes:
@@ -87,7 +96,7 @@ class Stages:
         return beneath
 
     def least_share(self, exposed: Exposure) -> float:
-        """See request.Stages. The device finds the lowest share of each block."""
+        """Return the lowest alpha of exposed.share (request.Stages.least_share). The device finds it for each block."""
         width, height, _ = exposed.share.size
         least = self._textures.of("least", (-(-width // BLOCK), -(-height // BLOCK), 1), "r32f")
         images = {"clear": exposed.share, "least": least}
@@ -95,7 +104,7 @@ class Stages:
         return self._device.read(least).min()
 
     def lay(self, behind: Behind, layers: Sequence[Exposure], levels: bool) -> Texture:
-        """See request.Stages."""
+        """Return the picture of layers laid over the background (request.Stages.lay), a pass for each layer."""
         under, plate = behind.exposed.color, None
         size = width, height = under.size[:2]
         if behind.plate is not None:
@@ -120,7 +129,7 @@ class Stages:
         return under
 
     def release(self) -> None:
-        """Free all memory on the device. Call it inside Device.freeing."""
+        """Free all memory on the device. Call it inside `Device.current` or `Device.freeing`."""
         self._plain.release()
         self._edged.release()
         self._textures.release()

@@ -1,4 +1,4 @@
-"""Windows on a device: the source frames around the shown one. Each frame is read once while a window has it."""
+"""Windows on a device: they hold the source frames that a picture exposes, and read each frame once."""
 
 from __future__ import annotations
 
@@ -29,20 +29,30 @@ _STORED = {np.uint8: "rgba8", np.uint16: "rgba16", np.float16: "rgba16f", np.flo
 
 
 def summable(source: FrameSource) -> bool:
-    """Return whether running sums can be made of a source: whether its frames are opaque and have 8 bits."""
+    """Return whether running sums can be made of a source's frames: whether they are opaque and have 8 bits."""
     return np.dtype(source.dtype) == np.uint8 and source.alpha == "opaque"
 
 
 def beside(source: FrameSource, shutters: int) -> int:
-    """Return the bytes that a window must leave free: for a sent frame, and for the textures of other passes.
+    """Return how many bytes a window must leave free: for a sent frame, and for the textures of other passes.
 
     Diffusion along edges needs most: four times the coefficients.
+
+    Args:
+        source: The footage.
+        shutters: The number of shutters.
     """
     return source.width * source.height * (16 * (4 * -(-shutters // 4) + 2) + 4)
 
 
 class Part(NamedTuple):
-    """The part of a window in one texture array: `height` rows of pixels, from `top` on, of some layers."""
+    """The part of a window in one texture array.
+
+    Attributes:
+        top: The first row of pixels in it.
+        height: The number of rows.
+        layers: Which layers of the window are in it.
+    """
 
     top: int
     height: int
@@ -50,20 +60,22 @@ class Part(NamedTuple):
 
 
 class Window:
-    """The base of all windows: a texture array for each part, and the textures that the compositor draws into.
+    """The base of all windows, which hold the source frames that a picture exposes in texture arrays on a device.
 
-    Whether a window fits depends on sizes and on the device's budget, but not on the free memory. So a picture has the
-    same bits whatever was rendered before. A window is released if another one needs its memory.
+    It also has the textures that the compositor draws into. Whether a window fits depends on sizes and on the device's
+    budget, but not on the free memory. So a picture has the same bits whatever was rendered before. A window is
+    released if another one needs its memory.
 
     Attributes:
-        capacity: the most frames in a window
-        layers: the layers of all texture arrays
-        kind: their format
-        shutters: as for GPUCompositor.window
-        is_open: whether it has its textures; a released window cannot be used again
-        sends: whether every picture sends all frames, because the device has no room for them
-        cover: COVER of the shaders; 0: not of a layer
-        shot: the source frames that the loaded window may show
+        capacity: The most frames that it holds.
+        layers: The layers of all texture arrays.
+        kind: Their GLSL format.
+        parts: What part of the window each texture array has.
+        shutters: The number of shutters of its pictures.
+        is_open: Whether it has its textures; a released window cannot be used again.
+        sends: Whether every picture sends all frames, because the device has no room for them.
+        cover: Which weights its frames have (running_sums.accumulation); 0: none.
+        shot: The source frames that the loaded window may show.
     """
 
     layers: int
@@ -89,7 +101,7 @@ class Window:
         """Make the texture arrays and the picture.
 
         Raises:
-            NoDeviceError: there is no room for them, for all windows of a picture, and for other passes
+            NoDeviceError: There is no room for them, for all windows of a picture, and for other passes.
         """
         width, height = self._texels(self.source.width, self.source.height)
         size = width * height * texel_bytes(self.kind) * self.layers * self.source.windows
@@ -101,7 +113,10 @@ class Window:
         self.picture()
 
     def _divided(self, most: int) -> list[Part]:
-        """Return bands of rows with all layers: at most `most` bytes or BLOCK rows, and a multiple of BLOCK rows."""
+        """Divide the window into bands of rows with all layers, each with a texture array of at most `most` bytes.
+
+        The height of a band is a multiple of BLOCK rows, and at least that, except for the last one.
+        """
         source = self.source
         row_bytes = source.width * texel_bytes(self.kind) * self.layers
         rows = max(1, most // row_bytes // BLOCK) * BLOCK
@@ -109,34 +124,39 @@ class Window:
         return [Part(top, min(rows, source.height - top), range(self.layers)) for top in tops]
 
     def _texels(self, width: int, height: int) -> tuple[int, int]:
-        """Return the size (width, height) in texels of a layer with this size in pixels."""
+        """Return how large (width, height) a layer is in texels, for a picture of this size in pixels."""
         return width, height
 
     def _size(self, part: Part) -> tuple[int, int, int]:
-        """Return the size (width, height, layers) of a part's texture."""
+        """Return the size (width, height, layers) of the texture array of a part."""
         return *self._texels(self.source.width, part.height), len(part.layers)
 
     def stored(self) -> Iterator[tuple[Part, Texture]]:
-        """Yield each part with its texture array, which is valid until the next one."""
+        """Yield each part with its texture array, which is valid until the next part."""
         yield from zip(self.parts, self._textures, strict=True)
 
     def decode(self, light: str) -> int:
-        """Return DECODE of the shaders (`decoding`). light: what is summed (Options.light)."""
+        """Return how passes convert the stored samples to the light that is summed (see `decoding`).
+
+        Args:
+            light: Options.light.
+        """
         return 0
 
     def picture(self, levels: bool = False) -> Texture:
-        """Return the texture that the compositor draws into."""
+        """Return the texture that the compositor draws into: rgba8 for levels, else rgba32f."""
         return self._own("levels", "rgba8") if levels else self._own("picture", "rgba32f")
 
     def mixed(self) -> Texture:
-        """Return the texture for the sum of pictures that combine frames in several ways."""
+        """Return the texture for the sum of the pictures of shutters that combine frames in different ways."""
         return self._own("mixed", "rgba32f")
 
     def _own(self, name: str, kind: str) -> Texture:
-        """Return a texture of the picture's size."""
+        """Return the texture of a name, with the picture's size and one layer."""
         return self._extra.of(name, (self.source.width, self.source.height, 1), kind)
 
     def release(self) -> None:
+        """Free all textures. The window cannot be used again."""
         for texture in self._textures:
             texture.release()
         self._extra.release()
@@ -145,7 +165,7 @@ class Window:
 
 
 class Frames(Window):
-    """A window of unchanged frames: source frame i is in layer i mod `layers`.
+    """A window of frames as they are: source frame i is in layer i mod `layers`.
 
     If the device has no room for all parts, the frames stay on the host, and every picture sends them part by part. Its
     bits are the same.
@@ -181,7 +201,7 @@ class Frames(Window):
         return self._held.values()
 
     def load(self, positions: np.ndarray, options: Options, shot: range) -> None:
-        """See running_sums.Sums.load."""
+        """Read the frames at some positions that are not loaded. Arguments as for Sums.load."""
         self.shot = shot
         self.device.use(self.release)
         for index in sorted(set(windows.source_frames(options, positions, shot).tolist())):
@@ -198,7 +218,7 @@ class Frames(Window):
             self._held[layer] = index
 
     def stored(self) -> Iterator[tuple[Part, Texture]]:
-        """As Window.stored. Frames kept on the host are sent to one texture, part after part."""
+        """Yield each part with its texture array (Window.stored). Frames on the host are sent, part by part."""
         if self._host is None:
             yield from super().stored()
             return
@@ -215,7 +235,7 @@ class Frames(Window):
         return decoding(self.transfer, light)
 
     def _read(self, index: int) -> np.ndarray:
-        """Return the source's frame (height, width, 4) in the samples that are stored."""
+        """Return a frame (height, width, 4) of the source, with samples in the form that is stored."""
         frame = self.source.read(index)
         if self._linearises:
             frame = frame.astype(np.float32, copy=False)
@@ -225,7 +245,7 @@ class Frames(Window):
         return frame
 
     def _send(self, part: Part, texture: Texture, layer: int, frame: np.ndarray) -> None:
-        """Send a part's rows of a frame."""
+        """Send the rows of a frame that belong to a part to the part's texture."""
         if layer in part.layers:
             self._write(texture, frame[part.top : part.top + part.height], layer - part.layers.start)
 
@@ -238,7 +258,10 @@ class Frames(Window):
 
 
 class WholeFrames(Frames):
-    """A window of unchanged frames that are not divided: each texture array has as many as BAND_BYTES allow."""
+    """A window of frames that are not divided into bands, since exposures that follow something need whole ones.
+
+    Each texture array has as many frames as BAND_BYTES allow.
+    """
 
     def _divided(self, most: int) -> list[Part]:
         height = self.source.height
@@ -249,7 +272,10 @@ class WholeFrames(Frames):
 
 
 class PackedFrames(WholeFrames):
-    """A window of opaque 8-bit frames, packed in the light that is summed (shaders/pack.glsl)."""
+    """A window of whole, opaque 8-bit frames, packed into 32 bits a pixel for exposures that follow something.
+
+    shaders/pack.glsl packs them, in the light that is summed.
+    """
 
     _light: Light = "linear"
 
@@ -260,7 +286,7 @@ class PackedFrames(WholeFrames):
         return width + RIM, height + RIM
 
     def load(self, positions: np.ndarray, options: Options, shot: range) -> None:
-        """See running_sums.Sums.load."""
+        """Read the frames at some positions that are not loaded, and pack them. Arguments as for Sums.load."""
         if options.light != self._light:
             self._light = options.light
             self._held.clear()
@@ -280,11 +306,13 @@ class PackedFrames(WholeFrames):
 
 
 def decoding(stored: str, light: str) -> int:
-    """Return DECODE of the shaders: 0 unchanged, 1 to linear, 2 to encoded.
+    """Return how shaders convert stored samples to the light that is summed, the macro DECODE.
+
+    It is 0 for unchanged samples, 1 to linear light, and 2 to encoded values.
 
     Args:
-        stored: the samples' transfer, "srgb" or "linear"
-        light: what is summed (Options.light)
+        stored: The samples' transfer, "srgb" or "linear".
+        light: What is summed (Options.light).
     """
     summed = "srgb" if light == "encoded" else "linear"
     return 0 if stored == summed else 1 if summed == "linear" else 2

@@ -1,1 +1,1 @@
-"""Pure Python and NumPy that all other packages use."""
+"""The effect as data, the reference compositor, recipes and helpers: pure Python and NumPy, for all other packages."""

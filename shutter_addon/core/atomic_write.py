@@ -1,4 +1,7 @@
-"""Writing files whole or not at all: first into a folder beside their place, from which they are moved."""
+"""Write files whole or not at all: into a temporary folder beside their place, from which they are then moved.
+
+This module calls such a folder a part folder.
+"""
 
 import math
 import os
@@ -16,9 +19,9 @@ _NAME = re.compile(r"\.part-[0-9a-f]{16}")
 
 @contextmanager
 def writing(path: Path) -> Iterator[Path]:
-    """Yield a path of the same name to write to, and move it to `path` at the end.
+    """Yield a temporary path of the same name to write to, and move the written file to `path` at the end.
 
-    An exception removes it. A link at `path` is replaced, not followed.
+    If the block raises an exception, the temporary file is removed. A link at `path` is replaced, not followed.
 
     Raises:
         OSError: It cannot be written.
@@ -30,9 +33,9 @@ def writing(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def part_folder(parent: Path) -> Iterator[Path]:
-    """Yield a new folder in `parent`, and remove it with its content at the end.
+    """Yield a new part folder in `parent`, and remove it with its content at the end.
 
-    Libraries write by path; in a new folder, nobody can have placed a link, and no other process writes.
+    Libraries write files by path. In a new folder, nobody can have placed a link, and no other process writes.
 
     Raises:
         OSError: It cannot be made.
@@ -45,7 +48,11 @@ def part_folder(parent: Path) -> Iterator[Path]:
 
 
 def new_part(parent: Path) -> Path:
-    """Make a part folder in `parent`. OSError: it cannot be made."""
+    """Make a part folder in `parent` and return its path.
+
+    Raises:
+        OSError: It cannot be made.
+    """
     folder = parent / f".part-{secrets.token_hex(8)}"
     # Private to its owner, except on Windows, where moved files would keep the restriction.
     folder.mkdir(0o700 if os.name == "posix" else 0o777)
@@ -53,12 +60,12 @@ def new_part(parent: Path) -> Path:
 
 
 def is_part(name: str) -> bool:
-    """Return whether a name is that of a part folder."""
+    """Return whether a folder's name is that of a part folder."""
     return _NAME.fullmatch(name) is not None
 
 
 def clear_up(parent: Path) -> None:
-    """Remove part folders that killed processes left, where possible."""
+    """Remove part folders in `parent` that killed processes have left: those unchanged for LEFT_BEHIND seconds."""
     with suppress(OSError):
         parts = [parent / name for name in os.listdir(parent) if is_part(name)]
         if parts:
@@ -70,7 +77,10 @@ def clear_up(parent: Path) -> None:
 
 
 def _last_written(folder: Path) -> float:
-    """Return when a folder last changed, in seconds since 1970; infinity if unknown, so that it is never abandoned."""
+    """Return when a folder or a file in it last changed, in seconds since 1970.
+
+    It is infinity if that is unknown, so that the folder is never removed.
+    """
     try:
         times = [entry.stat(follow_symlinks=False).st_mtime for entry in os.scandir(folder)]
         return max([os.lstat(folder).st_mtime, *times])

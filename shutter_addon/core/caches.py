@@ -1,4 +1,4 @@
-"""Small caches: the last value of something, or the last values, with keys of what they depend on."""
+"""Small caches: the last value of something, or the last few values, each with a key of what it depends on."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ T = TypeVar("T")
 
 
 class LastValue(Generic[T]):
-    """The last value, with its key of plain values. It is made again for another key.
+    """A cache of one value. It is made again when its key changes.
 
     Attributes:
-        made: How many values were made, which distinguishes values with equal keys.
+        made: How many values have been made, which tells apart values with equal keys.
     """
 
     def __init__(self) -> None:
@@ -23,10 +23,15 @@ class LastValue(Generic[T]):
         self._kept: tuple[Hashable, T, bool] | None = None  # key, value, and whether that is exact
 
     def get(self, key: Hashable, make: Callable[[], T], *, quick: bool = False) -> T:
-        """Return the last value if its key is equal, else what `make` returns. If `make` raises, nothing is kept.
+        """Return the cached value if its key equals `key`, else make and cache one.
+
+        If `make` raises an exception, nothing is cached.
 
         Args:
-            quick: Accept an approximation, and let `make` return one. Exact requests do not use it.
+            key: Everything that the value depends on, as hashable plain data.
+            make: Makes the value.
+            quick: Whether an approximation suffices, as the cached value or as what `make` returns. A request that is
+                not quick does not get an approximation.
         """
         if self._kept is None or self._kept[0] != key or not (quick or self._kept[2]):
             self.clear()
@@ -37,19 +42,19 @@ class LastValue(Generic[T]):
         return self._kept[1]
 
     def clear(self) -> None:
-        """Drop the value."""
+        """Drop the cached value."""
         self._kept = None
 
 
 class RecentValues(dict[K, T]):
-    """The last used values by keys of plain values, the least recently used first."""
+    """A cache of the values that were used last, by key. As a dict, it has the least recently used one first."""
 
     def ask(self, key: K, make: Callable[[], T], most: int) -> T:
-        """Return a kept value, or make it and keep it beside most − 1 others."""
+        """Return the cached value of a key, or make it. At most `most` values are cached from then on."""
         return self.keep(key, self[key] if key in self else make(), most)
 
     def keep(self, key: K, value: T, most: int) -> T:
-        """Keep a value as the most recently used one, beside most − 1 others."""
+        """Cache a value as the most recently used one, drop others beyond `most` values in all, and return it."""
         self.pop(key, None)
         self[key] = value
         while len(self) > most:

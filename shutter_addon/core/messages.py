@@ -1,4 +1,4 @@
-"""Messages for users: one line each, printable on every terminal."""
+"""Errors and messages for users: each one line, printable on every terminal."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ LONGEST = 300  # characters
 
 
 class UserError(Exception):
-    """An error that a user can fix. Its message is one printable sentence that begins with the place."""
+    """An error that a user can fix. Its message is one printable sentence that begins with the place of the error."""
 
     def __init__(self, *arguments: object) -> None:
         super().__init__(*arguments)
@@ -23,11 +23,11 @@ class UserError(Exception):
 
 
 class EffectError(UserError, RuntimeError):
-    """The effect cannot be rendered. The message is one sentence.
+    """An error of an effect that cannot be rendered.
 
     Attributes:
-        template: The sentence with placeholders, so that an interface can translate it.
-        words: Values of the placeholders.
+        template: The message, one sentence, with placeholders as in str.format, so that an interface can translate it.
+        words: The values of the placeholders.
     """
 
     def __init__(self, template: str, **words: object) -> None:
@@ -36,12 +36,16 @@ class EffectError(UserError, RuntimeError):
 
 
 class MediaError(UserError):
-    """An error of a file: a sentence for the user that names the file."""
+    """An error of a media file. The message is a sentence for the user that names the file."""
 
 
 @contextmanager
 def translated(translate: Callable[[str], str]) -> Iterator[None]:
-    """In this context, raise EffectErrors in the user's language; `translate` translates templates."""
+    """Raise EffectErrors of this context again in the user's language.
+
+    Args:
+        translate: Translates the template of an error, and its placeholder "fault".
+    """
     try:
         yield
     except EffectError as error:
@@ -54,9 +58,10 @@ def translated(translate: Callable[[str], str]) -> Iterator[None]:
 
 
 def sentence(text: object, longest: int = LONGEST) -> str:
-    """Return the text on one line of at most `longest` characters, without its middle if it is longer.
+    """Return a text as one printable line of at most `longest` characters.
 
-    Sentences begin with the place and end with the reason. Unprintable characters are escaped.
+    A longer text loses its middle, since sentences begin with the place and end with the reason. Unprintable characters
+    are escaped.
     """
     words = " ".join(str(text).split())
     line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in words)
@@ -74,5 +79,5 @@ def of_file(error: Exception, place: str | os.PathLike[str] = "") -> str:
 
 
 def signed(text: object) -> str:
-    """Return the sentence after the extension's name, for output among Blender's own."""
+    """Return the sentence after "Virtual Shutter: ", for output among Blender's own."""
     return sentence(f"Virtual Shutter: {text}")

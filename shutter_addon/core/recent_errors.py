@@ -1,6 +1,6 @@
-"""The lines of the extension's source that made the last errors and warnings, for reports.
+"""The lines of the extension's source code that raised the last errors and warnings, for *Copy Report*.
 
-A message can contain names of the user's files, strips and scenes. The line that made it does not.
+A message can contain names of the user's files, strips and scenes. The line of code that made it does not.
 """
 
 from __future__ import annotations
@@ -18,7 +18,11 @@ _lines: list[tuple[str, float]] = []  # with seconds since the start, replaced a
 
 
 def record(level: int = 1) -> None:
-    """Keep the line of the caller, `level` calls up, that makes an error or reports a message."""
+    """Keep the line of code that makes an error or reports a message.
+
+    Args:
+        level: How many calls up that line is: 1 for the caller.
+    """
     frame = sys._getframe(level)
     while frame.f_back and frame.f_code.co_name == "__init__":  # of an error's class
         frame = frame.f_back
@@ -28,7 +32,7 @@ def record(level: int = 1) -> None:
 
 
 def exception(error: BaseException) -> None:
-    """Keep an unexpected error of the extension: its type and the extension's calls, but not its message."""
+    """Keep an unexpected error: its type, and the calls in the extension that led to it, but not its message."""
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if _is_ours(frame.filename)]
     if frames:
         calls = [f"{_place(frame.filename, frame.lineno)} {frame.name}" for frame in reversed(frames[-8:])]
@@ -36,11 +40,12 @@ def exception(error: BaseException) -> None:
 
 
 def last() -> list[str]:
-    """Return the kept lines with their times, the oldest first."""
+    """Return the kept lines, each with the seconds since the extension's start, the oldest first."""
     return [f"{seconds:.0f} s: {words}" for words, seconds in _lines]
 
 
 def _keep(words: str) -> None:
+    """Keep a line with the time, as the newest, and forget the same line from before."""
     global _lines
     others = [line for line in _lines if line[0] != words]
     _lines = [*others, (words, time.monotonic() - _start)][-MOST:]
@@ -51,4 +56,5 @@ def _is_ours(file: str) -> bool:
 
 
 def _place(file: str, line: int | None) -> str:
+    """Return the place of a line of code for reports, such as core/caches.py:12."""
     return f"{Path(file).relative_to(_PACKAGE).as_posix()}:{line}"

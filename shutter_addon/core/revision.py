@@ -1,4 +1,4 @@
-"""A counter of the edit's changes that Blender reports, and a cache of values until the next change.
+"""A counter of the changes to the edit that Blender reports, and a cache of values that hold until the next change.
 
 Blender reports changed properties (update callbacks), keys and strips (depsgraph), undo and loaded files. It does not
 report strokes and files on disk; previews look for these when they are drawn (rendering/invalidation.py).
@@ -14,11 +14,11 @@ _MOST = 128  # cached values
 
 
 class Revision:
-    """A counter of changes, and values that are kept until the next one.
+    """A counter of changes to an edit, and a cache of values until the next change.
 
     Attributes:
-        number: While it is equal, only the current frame can have changed.
-        replaced: How often Blender's data was replaced, by undo or another file.
+        number: The count. As long as it stays the same, nothing but the current frame can have changed.
+        replaced: How often Blender's data was replaced as a whole, by undo or by loading a file.
     """
 
     def __init__(self) -> None:
@@ -27,14 +27,20 @@ class Revision:
         self._kept: RecentValues[tuple, tuple[Any, Exception | None]] = RecentValues()
 
     def changed(self) -> None:
-        """Count a change, or a possible change."""
+        """Count a change, or what may be one."""
         self.number += 1
         self._kept.clear()
 
     def until_change(self, what: str, key: Hashable, make: Callable[[], T]) -> T:
-        """Return what `make` returns or raises, called once per subject and key until the next change.
+        """Return what `make` returns, or raise what it raises. It is called once for a name and key until a change.
 
-        This is for drawing. Operators can follow a change that Blender has not reported yet, and read again.
+        This is for drawing, which happens often. Operators read anew, since they can come after a change that Blender
+        has not reported yet.
+
+        Args:
+            what: A name for the kind of value.
+            key: Everything else that the value depends on.
+            make: Makes the value.
         """
         value, error = self._kept.ask((self.number, what, key), lambda: _outcome(make), _MOST)
         if error is not None:
@@ -42,7 +48,7 @@ class Revision:
         return value
 
     def known(self, what: str, key: Hashable) -> Any:
-        """Return the cached value of `until_change`, or None."""
+        """Return the value that `until_change` has cached for a name and key, or None."""
         return self._kept.get((self.number, what, key), (None, None))[0]
 
 

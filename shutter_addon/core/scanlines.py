@@ -1,4 +1,4 @@
-"""Filling closed polygons by scanlines.
+"""Fill closed polygons line by line.
 
 Polygons (n, 2) are in pixels from the corner of the first pixel, x along the lines and y across them.
 """
@@ -11,13 +11,21 @@ import numpy as np
 
 
 def edges(polygons: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the starts and ends of the polygons' edges, (m, 2) each."""
+    """Return the starts and ends of all edges of closed polygons, (m, 2) each."""
     start = np.concatenate([np.zeros((0, 2)), *polygons])
     return start, np.concatenate([np.zeros((0, 2)), *(np.roll(polygon, -1, axis=0) for polygon in polygons)])
 
 
 def crossings(start: np.ndarray, end: np.ndarray, lines: range) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return where edges cross the middles of lines: edge, line and x, (m,) each."""
+    """Return where edges cross the middles of lines.
+
+    Args:
+        start, end: Of the edges, (n, 2).
+        lines: The numbers of the lines; line i has its middle at y = i + 0.5.
+
+    Returns:
+        For each crossing the edge's index, the line's number and x, (m,) each.
+    """
     lower, upper = np.where((start[:, 1] < end[:, 1])[:, None], (start, end), (end, start))
     first, last = (
         np.clip(np.ceil(y - 0.5), lines.start, lines.stop).astype(np.intp) for y in (lower[:, 1], upper[:, 1])
@@ -31,11 +39,15 @@ def crossings(start: np.ndarray, end: np.ndarray, lines: range) -> tuple[np.ndar
 def fill(
     picture: np.ndarray, polygons: Sequence[np.ndarray], value: float, *, odd: bool = False, seam: float = 0.0
 ) -> bool:
-    """Set the pixels of a picture (h, w) with a nonzero winding number. Return whether there are any.
+    """Set the pixels of a picture (h, w) whose middles are inside closed polygons. Return whether there are any.
 
     Args:
-        odd: Fill by the even-odd rule instead.
-        seam: Extend filled spans along x by so many pixels.
+        picture: The picture.
+        polygons: (n, 2) in pixels. What any of them winds around counts as inside (nonzero rule).
+        value: The new value.
+        odd: What an even number of them winds around is outside (even-odd rule).
+        seam: Pixels by which a filled span of a line is longer at its end, so that rounding leaves no gap to the next
+            one.
     """
     height, width = picture.shape
     start, end = edges(polygons)
@@ -53,7 +65,14 @@ def fill(
 
 
 def ranges(first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return all integers of ranges first … last − 1 (n,): index of the range, and integer."""
+    """Return all integers of several ranges from `first` to `last` − 1 in one array.
+
+    Args:
+        first, last: Of the ranges, (r,).
+
+    Returns:
+        The index of its range for each integer, and the integers, (n,) each.
+    """
     counts = np.maximum(last - first, 0)
     index = np.repeat(np.arange(len(counts)), counts)
     return index, np.arange(len(index)) - np.repeat(np.cumsum(counts) - counts - first, counts)

@@ -1,4 +1,4 @@
-"""Cancelling work: it checks between short steps whether it is still wanted.
+"""Cancel work: between short steps, work calls `check`, which raises StoppedError if the work is no longer wanted.
 
 A step is a pass over a picture, or waiting for a frame. Work can end after any step, so state that is kept between
 steps has to be valid.
@@ -14,22 +14,25 @@ from dataclasses import dataclass
 
 
 class StoppedError(Exception):
-    """The work is no longer wanted."""
+    """The work was cancelled, or its time slice is over."""
 
 
 def never() -> bool:
+    """Return False. As `stopped` of `once`, it never cancels work."""
     return False
 
 
 @dataclass
 class Slice:
-    """A time slice, after which work ends to continue in the next slice.
+    """A time slice of work that would freeze the window if it ran in one go. The next slice continues it.
+
+    Calling it returns whether its time is over.
 
     Attributes:
-        soon: Time of time.monotonic() when work ends if it has kept something for the next slice.
-        end: Time when it ends in any case.
+        soon: When it ends (by time.monotonic) if it has kept a result for the next slice.
+        end: When it ends in any case.
         waits: Whether work may wait for another thread's results.
-        has_kept: Whether something was kept.
+        has_kept: Whether it has kept a result.
     """
 
     soon: float
@@ -47,12 +50,15 @@ _LONGER, _AGAIN = 1.02, 1.5
 
 @dataclass
 class Slices:
-    """The time slices in which one result is made, each longer than the one before.
+    """Time slices in which one result is made piece by piece, so that the window does not freeze.
+
+    Each is longer than the last one, so that all work ends.
 
     Attributes:
-        key: Of the result.
+        key: Which result is being made.
         last: The last slice; None: nothing is being made.
-        soon, seconds: The last slice's duration with something kept, and at most.
+        soon: How many seconds the last slice lasts once it has kept something for the next one.
+        seconds: How many seconds it lasts at most.
     """
 
     key: Hashable = None
@@ -61,7 +67,14 @@ class Slices:
     seconds: float = 0.0
 
     def next(self, key: Hashable, first: float, least: float, *, waits: bool = True) -> Slice:
-        """Begin a slice of `first` seconds for a new key, or a longer one."""
+        """Return the next slice.
+
+        Args:
+            key: Which result is made. A new one begins with a slice of `first` seconds.
+            first: Seconds.
+            least: The least seconds of a later slice.
+            waits: Whether work may wait for another thread's results.
+        """
         if self.last is None or self.key != key:
             self.soon = self.seconds = first
         else:
@@ -72,7 +85,7 @@ class Slices:
         return self.last
 
     def end(self) -> None:
-        """Mark the result as made."""
+        """Note that the result has been made."""
         self.key = self.last = None
 
 
@@ -81,7 +94,7 @@ _stopped: ContextVar[Callable[[], bool]] = ContextVar("stopped", default=never)
 
 @contextmanager
 def once(stopped: Callable[[], bool]) -> Iterator[None]:
-    """In this context and thread, stop work when `stopped` returns true."""
+    """Cancel work of this thread inside the context, at its next `check`, when `stopped` returns true."""
     token = _stopped.set(stopped)
     try:
         yield
@@ -90,7 +103,7 @@ def once(stopped: Callable[[], bool]) -> Iterator[None]:
 
 
 def kept() -> None:
-    """Note that this step's result is kept if work ends here."""
+    """Note that a result has been cached, so that work that ends here will not repeat this step."""
     if isinstance(now := _stopped.get(), Slice):
         now.has_kept = True
 
@@ -101,6 +114,6 @@ def waits() -> bool:
 
 
 def check() -> None:
-    """Raise StoppedError if the current work has to end."""
+    """Raise StoppedError if the work of this thread has to end. Call it between steps."""
     if _stopped.get()():
         raise StoppedError

@@ -1,4 +1,4 @@
-"""Threads: only this module starts any.
+"""Threads. Only this module starts any.
 
 docs/internals.md (Threads) lists what runs on them, and why none of it touches Blender's data, which belongs to
 Blender's main thread.
@@ -33,7 +33,7 @@ def pool(workers: int | None = None) -> ThreadPoolExecutor:
 
 
 def fulfil(future: Future[T], function: Callable[[], T]) -> bool:
-    """Set a future to what a function returns or raises. Return False if the future was cancelled."""
+    """Set a future to what a function returns or raises. If the future was cancelled, return False without a call."""
     if not future.set_running_or_notify_cancel():
         return False
     try:
@@ -44,13 +44,17 @@ def fulfil(future: Future[T], function: Callable[[], T]) -> bool:
 
 
 def daemon(function: Callable[..., object], *arguments: object) -> threading.Thread:
-    """Call a function on a thread that does not keep Python from exiting, and which prints what it raises."""
+    """Call a function on a new thread, which does not keep Python from exiting, and return the thread.
+
+    An exception is printed, and noted for reports (recent_errors).
+    """
     thread = threading.Thread(target=_noting, args=(function, *arguments), name=_NAME, daemon=True)
     thread.start()
     return thread
 
 
 def _noting(function: Callable[..., object], *arguments: object) -> None:
+    """Call a function, and note an exception for reports before it is raised."""
     try:
         function(*arguments)
     except Exception as error:  # unexpected: functions report other errors themselves
@@ -59,14 +63,15 @@ def _noting(function: Callable[..., object], *arguments: object) -> None:
 
 
 def beside(steps: Iterable[T], patience: float | None) -> Generator[T | None, None, None]:
-    """Iterate over `steps` on another thread, which runs ahead, and yield its results.
+    """Iterate over `steps` on another thread, and yield their results here as they come.
 
-    Closing the generator stops the thread at its next `stopping.check` and waits for it. What `steps` raises is raised
-    here.
+    The thread runs ahead. Closing the generator cancels it at its next `stopping.check` and waits for it. An exception
+    of `steps` is raised here.
 
     Args:
         steps: What to iterate over.
-        patience: After so many seconds without a result, yield None and go on waiting. None: only yield results.
+        patience: Seconds without a result after which None is yielded, so that the caller can do something else. None:
+            never.
     """
     ended, results = threading.Event(), queue.SimpleQueue[tuple[T | None, Exception | None, bool]]()
     thread = daemon(_find, steps, ended, results)
@@ -88,6 +93,7 @@ def beside(steps: Iterable[T], patience: float | None) -> Generator[T | None, No
 
 
 def _find(steps: Iterable, ended: threading.Event, results: queue.SimpleQueue) -> None:
+    """Put the results of `steps` into a queue until `ended` is set: (result, exception, whether it is the end)."""
     try:
         with once(ended.is_set):
             for step in steps:

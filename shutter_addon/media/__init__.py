@@ -1,4 +1,4 @@
-"""Footage: movies through PyAV, image sequences through OpenImageIO, cuts, tracking, optical flow. No bpy."""
+"""Footage: movies, image sequences and the files of mattes, cuts, optical flow, and files made from footage. No bpy."""
 
 from ..core.frames.frame_source import FrameSource
 from ..core.messages import MediaError

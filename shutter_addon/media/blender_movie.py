@@ -1,7 +1,7 @@
-"""Movies without PyAV: a second Blender decodes the frames of movie.MovieSource.
+"""Movies where PyAV is missing: a second Blender, a process that this one starts, decodes their frames.
 
-`lend` sets the command that starts it. blender/data/decoding_process.py is the other side of the pipe. The process ends
-with this one.
+`lend` sets the command that starts the process. blender/data/decoding_process.py is the script that it runs; questions
+and answers go through pipes. It ends with this process.
 """
 
 import itertools
@@ -32,13 +32,13 @@ _PIPE = 1 << 20  # the pipe's bytes, if they can be set; with 64 KB a frame take
 
 @dataclass
 class _Decoder:
-    """The process that decodes movies.
+    """The process that decodes movies; all of them share one.
 
     Attributes:
-        command: starts it
-        process: the running one
-        asking: held during a question, from any thread
-        numbers: the movies' numbers in the process, which may have a file open several times
+        command: The command that starts it. None: movies cannot be decoded this way.
+        process: The running process, or None.
+        asking: Held while a question waits for its answer, from any thread.
+        numbers: Numbers under which the process knows movies; a file may be open several times.
     """
 
     command: list[str] | None = None
@@ -48,7 +48,7 @@ class _Decoder:
 
 
 class BlenderMovie(FrameSource):
-    """A movie's frames, decoded by a second Blender.
+    """A movie whose frames a second Blender decodes.
 
     8-bit frames equal those of movie.MovieSource to the bit; deeper ones are Blender's floats. In place of damaged
     frames Blender may show others.
@@ -96,7 +96,10 @@ class BlenderMovie(FrameSource):
 
 
 def frame_rate(number: float) -> Fraction:
-    """Return the frame rate of Blender's float: a whole number, such a number · 1000/1001, or the nearest fraction."""
+    """Return the exact frame rate for Blender's, which is a float.
+
+    It is a whole number, a whole number · 1000/1001, or else the nearest fraction.
+    """
     for rate in (Fraction(round(number)), Fraction(round(number * 1.001) * 1000, 1001)):
         if rate and abs(float(rate) / number - 1) <= _FLOAT_ERROR:
             return rate
@@ -104,10 +107,10 @@ def frame_rate(number: float) -> Fraction:
 
 
 def lend(command: list[str] | None) -> None:
-    """Set the command that starts the process, and end a running one.
+    """Set the command that starts the process, and end a running process.
 
     Args:
-        command: gets ANSWER as its last argument. None: movies cannot be decoded this way.
+        command: The command, which gets ANSWER as its last argument. None: movies cannot be decoded this way.
     """
     BlenderMovie.decoder.command = command
     if (process := BlenderMovie.decoder.process) is not None:
@@ -119,12 +122,22 @@ def lend(command: list[str] | None) -> None:
 
 
 def is_lent() -> bool:
-    """Return whether movies can be decoded this way."""
+    """Return whether a second Blender can decode movies: whether there is a command that starts it."""
     return BlenderMovie.decoder.command is not None
 
 
 def ask(wanted: dict) -> tuple[dict, np.ndarray | None]:
-    """Return the process's answer, and a frame in new memory if there is one; raise MediaError with its message."""
+    """Ask the process, and return its answer.
+
+    Args:
+        wanted: A question, as decoding_process.py describes them.
+
+    Returns:
+        The answer's properties, and a frame (H, W, 4) if one was asked for.
+
+    Raises:
+        MediaError: With the process's message, or because it has ended.
+    """
     with BlenderMovie.decoder.asking:
         for _ in range(2):  # another movie may have ended it
             if (answer := _answer(wanted)) is not None:
@@ -133,7 +146,11 @@ def ask(wanted: dict) -> tuple[dict, np.ndarray | None]:
 
 
 def _answer(wanted: dict) -> tuple[dict, np.ndarray | None] | None:
-    """Return the answer, or None if the process has ended or was killed because it did not answer."""
+    """Return the answer of the process, which is started if it does not run; arguments and results as for `ask`.
+
+    Returns:
+        None if the process has ended, or was killed because it did not answer.
+    """
     process = BlenderMovie.decoder.process or _started()
     try:
         with _killed_after(ANSWERING, process):
@@ -149,7 +166,7 @@ def _answer(wanted: dict) -> tuple[dict, np.ndarray | None] | None:
 
 @contextmanager
 def _killed_after(seconds: float, process: subprocess.Popen[bytes]) -> Iterator[None]:
-    """Kill the process if this context lasts longer. Pipes have no timeout."""
+    """Kill the process if this context lasts longer than some seconds. Reading from a pipe has no timeout."""
     ended = threading.Event()
 
     def watch() -> None:
@@ -164,7 +181,12 @@ def _killed_after(seconds: float, process: subprocess.Popen[bytes]) -> Iterator[
 
 
 def _asked(process: subprocess.Popen[bytes], question: bytes) -> tuple[dict, np.ndarray | None]:
-    """Ask the process; raise EOFError if it ends before it answers."""
+    """Send a question to the process, and return its answer as `ask` does.
+
+    Raises:
+        MediaError: The answer is an error.
+        EOFError: The process ended before it answered.
+    """
     assert process.stdin is not None
     assert process.stdout is not None
     process.stdin.write(question)
@@ -181,9 +203,7 @@ def _asked(process: subprocess.Popen[bytes], question: bytes) -> tuple[dict, np.
 
 
 def _line(stream: IO[bytes]) -> bytes:
-    """Read the next answer's line and return it without its mark ANSWER.
-
-    Skip other lines, which Blender itself prints.
+    """Return the next line of the process that is an answer, without the mark ANSWER. Skip what Blender itself prints.
 
     Raises:
         EOFError: The process has ended.
@@ -195,7 +215,11 @@ def _line(stream: IO[bytes]) -> bytes:
 
 
 def _started() -> subprocess.Popen[bytes]:
-    """Start the process; raise MediaError if that fails."""
+    """Start the process and return it.
+
+    Raises:
+        MediaError: It cannot be started.
+    """
     if BlenderMovie.decoder.command is None:
         raise MediaError("no Blender decodes it any more")
     try:
@@ -219,6 +243,7 @@ def _started() -> subprocess.Popen[bytes]:
 
 
 def _end() -> None:
+    """End the process and wait until it is gone; kill it if that takes too long."""
     process, BlenderMovie.decoder.process = BlenderMovie.decoder.process, None
     if process is not None:
         with _killed_after(ENDING, process), suppress(OSError), process:  # closes its pipes and waits for its end

@@ -1,8 +1,7 @@
-"""Sources in any color space of Blender. And the code values, to the bit, that Blender's sequencer shows for light
-(sRGB, view transform Standard).
+"""Footage in any color space of Blender, and the code values that Blender's sequencer shows for light, to the bit.
 
-Blender converts with OpenColorIO, whose powers are polynomials with about 15 bits. So the same conversions are made
-here, as often as Blender makes them.
+The latter are for sRGB displays and the view transform Standard. Blender converts with OpenColorIO, whose powers are
+polynomials with about 15 bits. So the same conversions are made here, as often as Blender makes them.
 """
 
 from functools import cache
@@ -22,15 +21,18 @@ TRANSFERS = {"sRGB": "srgb", SCENE_LINEAR: "linear", "Non-Color": "linear"}
 
 
 def in_colorspace(source: FrameSource, name: str, config: str | Path | None) -> FrameSource:
-    """Return a source whose samples are in a color space: the source itself, or a ColorSource.
+    """Interpret a source's samples in a color space.
 
     Args:
-        source: the footage
-        name: Blender's name of the color space
-        config: the OpenColorIO configuration, not needed for sRGB and scene linear
+        source: The footage.
+        name: Blender's name of the color space.
+        config: The OpenColorIO configuration; not needed for sRGB and Linear Rec.709.
+
+    Returns:
+        The source itself with another `transfer`, or a ColorSource that converts its frames.
 
     Raises:
-        MediaError: the configuration has no such color space
+        MediaError: The configuration has no such color space.
     """
     if name in TRANSFERS:
         source.transfer = TRANSFERS[name]
@@ -40,7 +42,14 @@ def in_colorspace(source: FrameSource, name: str, config: str | Path | None) -> 
 
 @cache
 def keeps(name: str, config: str | Path) -> bool:
-    """Return whether converting 8-bit colors to a color space and back changes them by less than a level."""
+    """Return whether 8-bit sRGB colors survive a conversion to a color space and back, within less than a level.
+
+    If the configuration does not have the color space, return True.
+
+    Args:
+        name: Blender's name of the color space.
+        config: The OpenColorIO configuration.
+    """
     if name in TRANSFERS:
         return True
     levels = np.linspace(0, 1, 18, dtype=np.float32)
@@ -57,7 +66,10 @@ def _converted(picture: ImageBuf, space: str, other: str, config: str | Path, as
 
 
 class ColorSource(SourceWrapper):
-    """A source converted to scene linear float32."""
+    """A source whose frames are converted from a color space to scene-linear float32.
+
+    Arguments and errors as for `in_colorspace`.
+    """
 
     transfer, dtype = "linear", np.dtype(np.float32)
 
@@ -69,7 +81,11 @@ class ColorSource(SourceWrapper):
         self.options = {**source.options, "colorspace": name}
 
     def read(self, index: int) -> np.ndarray:
-        """Return the source's frame in scene linear light; raise MediaError if it cannot be converted."""
+        """Return the source's frame (height, width, 4) in scene-linear light.
+
+        Raises:
+            MediaError: It cannot be read or converted.
+        """
         samples = self._source.read(index)
         scale = np.iinfo(samples.dtype).max if samples.dtype.kind == "u" else 1
         picture = ImageBuf(samples.astype(np.float32) / np.float32(scale))
@@ -82,20 +98,21 @@ class ColorSource(SourceWrapper):
 
 
 def shown(light: np.ndarray) -> np.ndarray:
-    """Return the display's code values of light float32 of any shape.
+    """Return the code values that an sRGB display gets for scene-linear light, float32 of any shape.
 
     Raises:
-        RuntimeError: this OpenImageIO cannot convert it
+        RuntimeError: This version of OpenImageIO cannot convert it.
     """
     return _transformed(light, (_ENCODE,))
 
 
 def blended(light: np.ndarray) -> np.ndarray:
-    """Return `shown` for light that the sequencer blended: it converts to its own colors and back first."""
+    """Return `shown` for light that the sequencer has blended with other strips: it encodes, decodes and encodes it."""
     return _transformed(light, (_ENCODE, _DECODE, _ENCODE))
 
 
 def _transformed(light: np.ndarray, paths: tuple[str, ...]) -> np.ndarray:
+    """Return values float32 of any shape, converted by OpenColorIO with files of transforms, one after another."""
     samples = np.zeros(-(-light.size // 3) * 3, np.float32)
     samples[: light.size] = light.ravel()
     buffer = ImageBuf(samples.reshape(1, -1, 3))

@@ -1,4 +1,7 @@
-"""Finds cuts like PySceneDetect, by small pictures of a few neighboring frames. And a source that knows its shots."""
+"""Find cuts as PySceneDetect does, from small pictures of neighboring frames. And a source that finds its own cuts.
+
+A shot is the frames between two cuts.
+"""
 
 from __future__ import annotations
 
@@ -45,13 +48,15 @@ Signature = np.ndarray
 
 
 def signature(frame: np.ndarray | Planes, transfer: str, alpha: str = "opaque") -> Signature:
-    """Return a small picture (18, 32, 3) float32 of a frame, in encoded levels 0 … 255. It is never larger than the
-    frame.
+    """Return a small picture of a frame, from which cuts are found.
 
     Args:
-        frame: (H, W, 4), or planes
-        transfer: the source's
-        alpha: the source's
+        frame: (H, W, 4), or planes.
+        transfer: The source's.
+        alpha: The source's.
+
+    Returns:
+        Encoded levels 0 … 255, float32 (18, 32, 3), or smaller if the frame is.
     """
     height, width = (frame.luma if isinstance(frame, Planes) else frame).shape[:2]
     down, right = max(1, height // (5 * _ROWS)), max(1, width // (10 * _COLUMNS))
@@ -75,7 +80,7 @@ def signature(frame: np.ndarray | Planes, transfer: str, alpha: str = "opaque") 
 
 @lru_cache(8)
 def _blocks(length: int, most: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the starts and lengths of at most `most` blocks of samples."""
+    """Return the starts and lengths of at most `most` blocks of nearly equal size that divide `length` samples."""
     edges = np.linspace(0, length, min(most, length) + 1).astype(int)
     return edges[:-1], np.diff(edges)
 
@@ -92,8 +97,8 @@ def is_cut(before: list[Signature], after: list[Signature]) -> bool:
     lasting changes of a whole still picture, and jumps of the camera by more than 1 / REACH.
 
     Args:
-        before: signatures of up to NEIGHBOURS successive frames, fewer only at the clip's start
-        after: the same, fewer only at its end
+        before: Signatures of up to NEIGHBOURS successive frames, fewer only at the clip's start.
+        after: The same for the frames after the possible cut, fewer only at the clip's end.
     """
     if not may_be_cut(before[-1], after[0]):
         return False
@@ -110,31 +115,43 @@ def is_cut(before: list[Signature], after: list[Signature]) -> bool:
 
 
 def may_be_cut(before: Signature, after: Signature) -> bool:
-    """Return whether these two neighbors allow a cut between them."""
+    """Return whether two successive frames differ enough for a cut between them, by their signatures.
+
+    It is a quick test. `is_cut` also needs the frames around them.
+    """
     return _differ(before, after, NOISE) and _unlike(before, after) >= APART
 
 
 def _parts(picture: Signature) -> list[Signature]:
+    """Return the PARTS × PARTS parts of a frame's small picture."""
     split = (np.array_split(rows, PARTS, axis=1) for rows in np.array_split(picture, PARTS))
     return [part for parts in split for part in parts if part.size]
 
 
 def _shared(picture: Signature, down: int, right: int) -> Signature:
-    """Return the part of a picture that overlaps with its frame, moved by some blocks."""
+    """Return the part of a frame's small picture that another one also shows if the camera jumped by some blocks."""
     height, width = picture.shape[:2]
     return picture[max(down, 0) : height + min(down, 0), max(right, 0) : width + min(right, 0)]
 
 
 def _differ(before: Signature, after: Signature, least: float, share: float = 1.0) -> bool:
-    """Return whether brightness changes by a share of a cut's change, and by at least `least` levels."""
+    """Return whether brightness changes enough between the small pictures of two frames, or between parts of them.
+
+    Args:
+        before, after: The pictures.
+        least: The least change in levels of 255.
+        share: The least share of the change that a cut makes, which is less in dark pictures.
+    """
     threshold = max(share * CHANGE * min(max(before.mean(), after.mean()) / GREY, 1.0), least)
     return _change(before, after) >= threshold
 
 
 def _stands_out(before: list[Signature], after: list[Signature]) -> bool:
-    """Return whether more changes from before[0] to after[0] than between neighbors (AdaptiveDetector).
+    """Return whether brightness changes far more across the possible cut than between its neighbors (AdaptiveDetector).
 
-    Both lists lead away from the cut.
+    Args:
+        before: Signatures of the frames before the cut, the nearest one first.
+        after: Signatures of the frames after the cut, the nearest one first.
     """
     sides = before[: WINDOW + 1], after[: WINDOW + 1]
     beside = [_change(*pair) for side in sides for pair in pairwise(side)]
@@ -143,7 +160,7 @@ def _stands_out(before: list[Signature], after: list[Signature]) -> bool:
 
 
 def _moving(pictures: list[Signature]) -> list[Signature]:
-    """Return the pictures that do not repeat the one before."""
+    """Return those of successive frames' small pictures that do not repeat the last one."""
     kept = pictures[:1]
     for picture in pictures[1:]:
         if np.abs(kept[-1] - picture).max() > REPEATED:
@@ -156,21 +173,29 @@ def _moving(pictures: list[Signature]) -> list[Signature]:
 
 
 def _change(before: np.ndarray, after: np.ndarray) -> float:
-    """Return ContentDetector's score of luma: the mean difference of the largest color in levels."""
+    """Return the mean change of brightness (the largest color) between small pictures of two frames, in levels.
+
+    This is the score of PySceneDetect's ContentDetector for luma.
+    """
     return float(np.abs(_whole(before).max(axis=-1).astype(int) - _whole(after).max(axis=-1)).mean())
 
 
 def _unlike(before: np.ndarray, after: np.ndarray) -> float:
-    """Return the share of HashDetector's BITS × BITS bits that differs."""
+    """Return the share, 0 to 1, of bits in which the hashes of two frames' small pictures differ (HashDetector)."""
     return np.count_nonzero(_hash(before) != _hash(after)) / BITS**2
 
 
 def _whole(picture: np.ndarray) -> np.ndarray:
+    """Return a frame's small picture rounded to uint8."""
     return np.rint(picture).clip(0, 255).astype(np.uint8)
 
 
 def _hash(picture: np.ndarray) -> np.ndarray:
-    """Return which of the lowest frequencies are above their median."""
+    """Return the hash of a frame's small picture: which of its low frequencies exceed their median.
+
+    Returns:
+        bool (BITS, BITS), as by PySceneDetect's HashDetector.
+    """
     grey = (_whole(picture) @ _GREY + (1 << 14)) >> 15
     down, right = (_means(length, 2 * BITS) for length in grey.shape)
     small = np.rint(down @ grey @ right.T)  # like OpenCV's INTER_AREA except for rounding
@@ -181,7 +206,7 @@ def _hash(picture: np.ndarray) -> np.ndarray:
 
 @lru_cache(16)
 def _means(length: int, size: int) -> np.ndarray:
-    """Return the shares of `length` samples in `size` equal parts of an axis."""
+    """Return a matrix (size, length) that averages `length` samples in `size` equal parts of an axis."""
     scale = length / size
     edges = np.clip(np.arange(length + 1), *(np.arange(size)[:, None] * scale + end for end in (0, scale)))
     return np.diff(edges) / scale
@@ -189,22 +214,22 @@ def _means(length: int, size: int) -> np.ndarray:
 
 @lru_cache(2)
 def _waves(size: int) -> np.ndarray:
-    """Return the orthonormal discrete cosine transform, a row for each frequency."""
+    """Return the matrix (size, size) of the orthonormal discrete cosine transform, a row for each frequency."""
     waves = np.cos(np.pi / size * np.outer(np.arange(size), np.arange(size) + 0.5)) * np.sqrt(2 / size)
     waves[0] /= np.sqrt(2)
     return waves
 
 
 class ShotSource(SourceWrapper):
-    """A source that knows its shots.
+    """A source that finds its own cuts: the ShotFinder of another source, and a wrapper around it.
 
-    Cuts are looked for between filmed frames; the moments between two of them belong to the nearer one, the middle one
-    to the first. Frames that are read to find cuts wait for the next `read`, within a limit, so that none is decoded
-    twice. Cuts are cached, unless a frame could not be read.
+    Cuts lie between filmed frames; the moments between two of them belong to the nearer one, the middle one to the
+    first. Frames that are read to find cuts wait for the next `read`, within a limit, so that none is decoded twice.
+    Cuts are cached, unless a frame could not be read.
 
     Attributes:
-        step: every step-th frame was filmed
-        filmed: the number of filmed frames
+        step: Every step-th frame was filmed.
+        filmed: The number of filmed frames.
     """
 
     def __init__(self, source: FrameSource, step: int = 1) -> None:
@@ -220,19 +245,19 @@ class ShotSource(SourceWrapper):
         return self
 
     def read(self, index: int) -> np.ndarray:
-        """See FrameSource."""
+        """Return a frame (height, width, 4), as FrameSource.read does. One that waits is not decoded again."""
         return as_rgba(self.decoded(index))
 
     def decoded(self, index: int) -> Decoded:
-        """See FrameSource."""
+        """Return a frame in its fastest form, as FrameSource.decoded does. One that waits is not decoded again."""
         frame = self._handed.pop(index, None)
         return self._source.decoded(index) if frame is None else frame
 
     def around(self, index: int, low: int, high: int, *, known: bool = False) -> range:
-        """See ShotFinder. It reads frames without a signature, in ascending order.
+        """Return the frames of the shot around a frame (ShotFinder.around).
 
-        These are the window's frames up to the first cut after `index`, and NEIGHBOURS frames on each side of a
-        possible cut.
+        It reads frames that have no signature yet, in ascending order: those from `low` to the first cut after `index`,
+        and NEIGHBOURS frames on each side of a possible cut.
         """
         if known:
             return self._shot(index, low, high, self._cuts.get)
@@ -242,6 +267,7 @@ class ShotSource(SourceWrapper):
         return shot
 
     def _shot(self, index: int, low: int, high: int, is_cut: Callable[[int], bool | None]) -> range:
+        """Return the frames of the shot around `index`. `is_cut` tells which frames in `low` … `high` follow a cut."""
         first = 0
         for i in self._after(low, high):
             if is_cut(i):
@@ -251,13 +277,13 @@ class ShotSource(SourceWrapper):
         return range(first, self.count)
 
     def lacking(self, index: int, low: int, high: int) -> set[int]:
-        """Return the frames that `around` will read, unless it finds more possible cuts."""
+        """Return the frames that `around` will read for the same arguments, unless it finds more possible cuts."""
         stop = min(high + 1, self.around(index, low, high, known=True).stop)
         unknown = [i for i in self._after(low, stop - 1) if i not in self._cuts]
         return {j * self.step for i in unknown for j in (i - 1, i) if j not in self._signatures}
 
     def handed(self) -> set[int]:
-        """Return the frames that wait for `read`."""
+        """Return the frames that were read to find cuts and wait for `read`."""
         return set(self._handed)
 
     def release(self) -> None:
@@ -265,24 +291,25 @@ class ShotSource(SourceWrapper):
         self._handed = {}
 
     def close(self) -> None:
-        """Close the file. A later read opens it again."""
+        """Close the other source, and free the frames that wait. A later read opens the source again."""
         self.release()
         self._source.close()
 
     def _after(self, low: int, high: int) -> range:
-        """Return the filmed frames that begin between the frames `low` and `high`."""
+        """Return the numbers of filmed frames before which a cut would lie between the frames `low` and `high`."""
         first, last = (self._filmed(min(max(i, 0), self.count - 1)) for i in (low, high))
         return range(first + 1, last + 1)
 
     def _filmed(self, index: int) -> int:
-        """Return the nearest filmed frame."""
+        """Return the number of the filmed frame that is nearest to a frame."""
         return (index + (self.step - 1) // 2) // self.step
 
     def _start(self, filmed: int) -> int:
-        """Return the first frame that is nearest to a filmed one."""
+        """Return the first frame that belongs to a filmed one, given by its number."""
         return filmed * self.step - (self.step - 1) // 2
 
     def _is_cut(self, index: int) -> bool:
+        """Return whether there is a cut before a filmed frame, given by its number. A certain answer is cached."""
         if index in self._cuts:
             return self._cuts[index]
         cut, certain = self._decide(index)
@@ -303,7 +330,10 @@ class ShotSource(SourceWrapper):
         return is_cut(before, after), len(before) + len(after) == len(beside)
 
     def _signature(self, index: int) -> Signature | None:
-        """Return a signature, or None if the frame cannot be read. Reading the frame itself raises the error."""
+        """Return the signature (the small picture) of a filmed frame, or None if the frame cannot be read.
+
+        The error is not lost: reading the frame itself raises it again.
+        """
         if index in self._signatures:
             return self._signatures[index]
         try:
@@ -319,5 +349,5 @@ class ShotSource(SourceWrapper):
 
 
 def _known(signatures: Iterable[Signature | None]) -> list[Signature]:
-    """Return the signatures before the first missing one."""
+    """Return the signatures (small pictures) before the first one that is None, whose frame could not be read."""
     return [each for each in takewhile(lambda each: each is not None, signatures) if each is not None]

@@ -1,4 +1,8 @@
-"""Decodes frames of a video stream by time stamp, in any order, with the same result as decoding from the start."""
+"""Decode frames of a video stream by time stamp, in any order, with the same result as decoding from the start.
+
+A run is one decode from a place in the file onward. A frame is found by going on with the last run, or by a seek to a
+key frame before it, which begins another.
+"""
 
 from __future__ import annotations
 
@@ -42,23 +46,27 @@ class File(NamedTuple):
 
 
 class FrameReader:
-    """A file's video stream, for one thread at a time. It keeps the shown frame and the next one in memory.
+    """Reads frames of one video stream of a file, for one thread at a time. It keeps two frames in memory.
 
     Attributes:
-        time_base: the unit of time stamps
-        start: the stream's first time stamp
-        tags: of `_tags`
+        time_base: The unit of time stamps in seconds.
+        start: The stream's first time stamp.
+        tags: The stream's YUV matrix and range (`_tags`).
     """
 
     def __init__(self, path: Path, number: int = 0) -> None:
-        """Read a stream. number: which of the file's video streams."""
+        """Prepare to read a file's video stream. `number`: which one of several."""
         self._path, self._number, self._threads = path, number, "AUTO"
         self._container: InputContainer | None = None
         self._run: _Run | None = None
         self._landmarks = _Landmarks()
 
     def first(self) -> tuple[File, av.VideoFrame]:
-        """Return the open file and its first frame; raise MediaError if no frame can be decoded."""
+        """Return the open file and its first frame.
+
+        Raises:
+            MediaError: No frame can be decoded.
+        """
         run = self._restart()
         if run.shown is None:
             raise MediaError(f"{self._path.name}: no frame of it can be decoded")
@@ -70,11 +78,11 @@ class FrameReader:
         This is Blender's choice, also where time stamps go back.
 
         Args:
-            time: in units of time_base
-            step: the usual distance between frames
+            time: In units of time_base.
+            step: The usual distance between two frames in this unit.
 
         Raises:
-            MediaError: the file should have the frame, but it cannot be decoded. The message is only the reason.
+            MediaError: The file should have the frame, but it cannot be decoded. The message is only the reason.
         """
         try:
             return self._find(time, step)
@@ -86,6 +94,7 @@ class FrameReader:
         return self._find(time, step)
 
     def _find(self, time: float, step: float) -> av.VideoFrame:
+        """Return the frame at a time, as `frame_at` does, with the decoder as it is."""
         run = self._run_at(time, step)
         if run.is_first and run.next is not None and time <= _known(run).time == run.next.time:
             # If several key frames have that time, a seek finds the last one, as in Blender.
@@ -109,6 +118,7 @@ class FrameReader:
         self._container = self._run = None
 
     def _is_near(self, run: _Run, time: float, step: float) -> bool:
+        """Return whether a run gets to the frame at a time, and faster than a seek."""
         if run.shown is None or time < run.shown.time:
             return run.is_first
         if time <= run.passed:
@@ -116,6 +126,10 @@ class FrameReader:
         return run.next is None or time - run.next.time <= max(KEPT_DECODING, self._landmarks.longest) * step
 
     def _run_at(self, time: float, step: float) -> _Run:
+        """Return a run that will soon reach the frame at a time.
+
+        It is the last run if that is near, else one that begins with a seek, or at the file's start.
+        """
         if (run := self._run) is None:
             return self._restart()
         if self._is_near(run, time, step):
@@ -124,7 +138,11 @@ class FrameReader:
         return next(filter(None, tries), None) or self._restart()
 
     def _run_from(self, file: File, start: int, time: float) -> _Run | None:
-        """Decode from a key frame near `start`. None: its frame is damaged or later than `time`."""
+        """Seek to a key frame near the time stamp `start`, and decode from there.
+
+        Returns:
+            The run. None if its first frame is damaged or later than `time`.
+        """
         try:
             file.container.seek(start, stream=file.stream)
         except av.error.FFmpegError:
@@ -137,7 +155,7 @@ class FrameReader:
         return run if shown.frame.key_frame or shown.frame.pict_type == PictureType.I else None
 
     def _restart(self) -> _Run:
-        """Open the file again and decode from the start. With an edit list or without an index, a seek would fail."""
+        """Open the file again and decode from its start. With an edit list or without an index, a seek would fail."""
         self.close()
         self._container = av.open(str(self._path))
         stream = _video_stream(self._container, self._path.name, self._number)
@@ -146,7 +164,7 @@ class FrameReader:
         return self._begin(File(self._container, stream, _decoder(stream, self._threads)), seeking=False)
 
     def _begin(self, file: File, seeking: bool) -> _Run:
-        """Start the only run."""
+        """Start a run, in place of the last one. `seeking`: whether it does not begin at the file's start."""
         if self._run is not None:
             self._run.close()
             self._run = None
@@ -155,7 +173,11 @@ class FrameReader:
 
 
 class _Landmarks:
-    """Known key frames by their packets' time stamps and sizes, and the most frames from one to the next (longest)."""
+    """The key frames of a stream that were seen so far, which tell where decoding may begin.
+
+    Attributes:
+        longest: The most frames from one key frame to the next.
+    """
 
     def __init__(self) -> None:
         self._seen: dict[tuple[int | None, int], bool] = {}  # whether no packet before it has a later time
@@ -163,7 +185,7 @@ class _Landmarks:
         self.longest = self._since = 0
 
     def note(self, packet: Packet, from_start: bool) -> None:
-        """Take the next packet."""
+        """Take in the next packet of a run. `from_start`: whether the run began at the file's start."""
         self._since = 0 if packet.is_keyframe else self._since + 1
         self.longest = max(self.longest, self._since)
         time = time_of(packet)
@@ -174,32 +196,32 @@ class _Landmarks:
             self._latest = max(self._latest, packet.pts)
 
     def is_sound(self, packet: Packet, misleading: bool) -> bool:
-        """Return whether decoding may begin at a key frame: no packet before it has a later time.
+        """Return whether decoding may begin at a key frame: whether no packet before it has a later time.
 
         Args:
-            packet: the key frame's
-            misleading: whether a decode from the start must have seen it, as when time stamps go back
+            packet: The key frame's.
+            misleading: Whether only key frames count that a run from the start has seen, as when time stamps go back.
         """
         return self._seen.get((time_of(packet), packet.size), not (misleading or self._goes_back))
 
 
 class _Timed(NamedTuple):
-    """A frame with its time stamp."""
+    """A decoded frame with its time stamp."""
 
     time: int
     frame: av.VideoFrame
 
 
 class _Run:
-    """A decode from the container's position onward.
+    """A decode from a place in the file onward, frame after frame.
 
     Attributes:
-        shown: the frame on screen, None past the end
-        next: the frame after it, None past the end
-        fault: the last error's message
-        is_first: whether the file's first frame is shown
-        passed: the latest time of a frame before it
-        lost: the times of frames that could not be decoded
+        shown: The frame that it has reached, None past the end.
+        next: The frame after it, None past the end.
+        fault: The message of the last error, or "".
+        is_first: Whether `shown` is the file's first frame.
+        passed: The latest time stamp of a frame before `shown`.
+        lost: The time stamps of frames that could not be decoded.
     """
 
     def __init__(self, file: File, landmarks: _Landmarks, seeking: bool) -> None:
@@ -214,7 +236,7 @@ class _Run:
         self.next = next(self._frames, None)
 
     def close(self) -> None:
-        """End it. This breaks the cycle of the run and its generator, which would stay until Python collects it."""
+        """End the run. It breaks its reference cycle with its generator, which would stay until Python collects it."""
         self._frames.close()
 
     def advance(self) -> None:
@@ -224,7 +246,7 @@ class _Run:
         self.next = next(self._frames, None)
 
     def cut_off(self) -> bool:
-        """Return whether the file ended before its declared end."""
+        """Return whether the file ended before the end that its header declares."""
         container = self.file.container
         if self._broken or not self._ended or container.duration is None:
             return self._broken
@@ -232,11 +254,11 @@ class _Run:
         return promised - self._end > MISSING
 
     def _decoded(self, seeking: bool) -> Generator[_Timed, None, None]:
-        """Yield frames in order of presentation.
+        """Yield frames in the order in which they are shown.
 
         Args:
-            seeking: begin at the first key frame, without frames shown before it: in an open group they depend on
-                frames that were not decoded
+            seeking: Begin at the first key frame, and skip frames shown before it: they may depend on frames that were
+                not decoded (an open group of pictures).
         """
         floor: float | None = None if seeking else -math.inf
         misleading = self.file.container.format.name in MISLEADING
@@ -262,7 +284,7 @@ class _Run:
         self._settle(math.inf)
 
     def _packets(self) -> Iterator[Packet | None]:
-        """Yield the stream's packets, then None. Packets of all streams are read to know where the file ends."""
+        """Yield the stream's packets, then None. Packets of all streams are read, to know where the file ends."""
         try:
             for packet in self.file.container.demux():
                 if packet.size == 0:  # PyAV's mark of the end
@@ -277,6 +299,7 @@ class _Run:
         yield None
 
     def _decode(self, packet: Packet | None) -> list[av.VideoFrame]:
+        """Return the frames that the decoder gives for a packet (None: the last ones). An error is kept as `fault`."""
         try:
             return self.file.codec.decode(packet)
         except (av.error.FFmpegError, ValueError) as error:  # ValueError: the decoder could not be opened
@@ -284,7 +307,10 @@ class _Run:
             return []
 
     def _settle(self, time: float) -> None:
-        """Note frames before a time that never came. Without an error, they are not meant to be shown."""
+        """Look for frames before a time that the decoder has not given. After an error, they count as lost.
+
+        Without an error, they are not meant to be shown.
+        """
         while self._awaited and self._awaited[0] <= time:
             awaited = heapq.heappop(self._awaited)
             if awaited < time and self.fault:
@@ -292,24 +318,28 @@ class _Run:
 
 
 def _known(run: _Run) -> _Timed:
-    """Return the shown frame; raise MediaError if there is none, as when the file was replaced."""
+    """Return the frame that a run has reached.
+
+    Raises:
+        MediaError: There is none, as when the file was replaced.
+    """
     if run.shown is None:
         raise MediaError(run.fault or "no frame of it can be decoded")
     return run.shown
 
 
 def time_of(item: Packet | av.VideoFrame) -> int | None:
-    """Return the time stamp of a packet or frame. AVI files may only have those of decoding."""
+    """Return the time stamp of a packet or frame; that of decoding if it has no other, as in AVI files."""
     return item.dts if item.pts is None else item.pts
 
 
 def fraction(rational: AVRational | Fraction | None) -> Fraction:
-    """Return PyAV's rational as a Fraction, or 0 if there is none."""
+    """Return a rational number of PyAV as a Fraction; 0 if there is none."""
     return Fraction(rational.numerator, rational.denominator) if rational and rational.denominator else Fraction(0)
 
 
 def reason(error: Exception) -> str:
-    """Return libav's message of an error, for use inside a sentence."""
+    """Return FFmpeg's message of an error, in small letters for use inside a sentence."""
     text = (getattr(error, "strerror", None) or str(error)).strip()
     return text[:1].lower() + text[1:]
 
@@ -326,6 +356,11 @@ def _tags(codec: VideoCodecContext) -> tuple[int, bool]:
 
 
 def _video_stream(container: InputContainer, name: str, number: int) -> VideoStream:
+    """Return a video stream of an opened file; `number`: which one, without cover pictures.
+
+    Raises:
+        MediaError: There is no such stream, or the file is no movie. `name` is its name in the message.
+    """
     pictures = av.stream.Disposition.attached_pic
     streams = [s for s in container.streams.video if not s.disposition & pictures]
     if not streams or container.format.name == "tty":  # FFmpeg opens any text as a movie of a terminal
@@ -340,6 +375,7 @@ def _video_stream(container: InputContainer, name: str, number: int) -> VideoStr
 
 
 def _decoder(stream: VideoStream, threads: str) -> VideoCodecContext:
+    """Return the decoder of a stream. `threads`: how it may use threads, "AUTO" or "SLICE"."""
     codec = stream.codec_context
     # FFmpeg's decoders of VP8 and VP9 ignore alpha. Blender uses libvpx as well.
     if codec.name in ("vp8", "vp9") and stream.metadata.get("alpha_mode") == "1":

@@ -1,7 +1,8 @@
 """Files that are made from footage and kept: mattes of outlines, and vectors of optical flow.
 
-In their folders, only files with names of ours are opened or removed, and links are never followed. The name of a file,
-or of its folder, has a hash of everything that the file is made from. So after a change, another file is used.
+In their folders, only files with the extension's own names are opened or removed, and links are never followed. The
+name of a file, or of its folder, has a hash of everything that the file is made from. So after a change, another file
+is used.
 """
 
 from __future__ import annotations
@@ -40,6 +41,9 @@ def identity(source: FrameSource) -> dict:
 
     A change in a file larger than WHOLE goes unnoticed if it keeps the size and all blocks that are hashed.
 
+    Returns:
+        Plain data, for `key`.
+
     Raises:
         MediaError: A file is gone.
     """
@@ -51,7 +55,11 @@ def identity(source: FrameSource) -> dict:
 
 
 def key(made_of: dict) -> str:
-    """Return a short hash, for a file's name, of everything that the file is made from."""
+    """Return a short hash for the name of a file: 12 hexadecimal digits.
+
+    Args:
+        made_of: Everything that the file is made from, as plain data.
+    """
     return hashlib.sha256(json.dumps(made_of, sort_keys=True).encode()).hexdigest()[:12]
 
 
@@ -63,7 +71,7 @@ def content_digest(path: Path, whole: int = WHOLE) -> bytes:
         whole: Of a file with more bytes, only the size and blocks spread over it are hashed.
 
     Raises:
-        MediaError: The file is gone.
+        MediaError: The file is gone or is no regular file.
     """
     try:
         status = path.stat()
@@ -76,7 +84,10 @@ def content_digest(path: Path, whole: int = WHOLE) -> bytes:
 
 @lru_cache(maxsize=1 << 17)  # a sequence of an hour and a half
 def _hash(path: Path, size: int, _mtime: int, whole: int) -> bytes:
-    """Return the SHA-256 of a file's content or, over `whole` bytes, of its size and of blocks spread over it."""
+    """Return the SHA-256 of a file's content or, over `whole` bytes, of its size and of blocks spread over it.
+
+    It is cached: a file of the same size and time of change is not read again.
+    """
     with path.open("rb") as file:
         if size <= whole:
             return hashlib.file_digest(file, "sha256").digest()
@@ -88,7 +99,7 @@ def _hash(path: Path, size: int, _mtime: int, whole: int) -> bytes:
 
 
 def size_of(path: Path) -> int | None:
-    """Return the size of a frame's file in bytes without opening it, or None if there is no file. A link is no file."""
+    """Return the size of a file in bytes without opening it, or None if there is no file. A link is no file."""
     with suppress(OSError):
         status = path.lstat()
         return status.st_size if stat.S_ISREG(status.st_mode) else None
@@ -96,11 +107,15 @@ def size_of(path: Path) -> int | None:
 
 
 def opened(path: Path, spec: ImageSpec) -> ImageInput | None:
-    """Open a frame's file.
+    """Open a picture file that the extension has written, but only if it is exactly as expected.
+
+    Args:
+        path: The file.
+        spec: The size and samples that it must have. A file that somebody else has put there may have millions of
+            pixels.
 
     Returns:
-        None if the file is missing or damaged, or does not have exactly the size and samples of `spec`. A file that
-        somebody else has put there may have millions of pixels.
+        None if it is missing, damaged or otherwise.
     """
     size = size_of(path)
     if size is None or size > 2 * spec.image_bytes() + _LARGER:
@@ -117,7 +132,7 @@ def opened(path: Path, spec: ImageSpec) -> ImageInput | None:
 
 
 def read(path: Path, spec: ImageSpec, description: str = "") -> np.ndarray | None:
-    """Read a frame's samples.
+    """Return the samples of a picture file that the extension has written.
 
     Args:
         path: The file.
@@ -139,7 +154,7 @@ def read(path: Path, spec: ImageSpec, description: str = "") -> np.ndarray | Non
 
 
 def own_folder(path: Path) -> None:
-    """Make a folder of ours if it is missing. The folder that it lies in may be a link to another disk.
+    """Make a folder for files of the extension if it is missing. The folder around it may be a link to another disk.
 
     Raises:
         OSError: It cannot be made, or it is a link itself.
@@ -149,26 +164,26 @@ def own_folder(path: Path) -> None:
 
 
 def refuse_link(path: Path) -> None:
-    """Raise OSError for a link."""
+    """Raise OSError if a path is a link, which could lead to files of others."""
     if path.is_symlink() or path.is_junction():
         raise OSError(errno.ELOOP, "it is a link, and none is followed")
 
 
 class StoredVectors:
-    """Gives the vectors of pairs of frames: from a folder, or found now."""
+    """Finds the optical flow between two pictures, or reads it from a folder where it was stored before."""
 
     def __init__(self, folder: Path, writes: bool) -> None:
         """Use a folder.
 
         Args:
             folder: The folder, which may be missing.
-            writes: Whether to keep vectors there, if it can be written to.
+            writes: Whether to store vectors there that are not found in it, if it can be written to.
         """
         self._folder, self._writes = folder, writes
         self._is_new = True  # nothing was written yet
 
     def found(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """Return what flow.found returns for two pictures."""
+        """Return the vectors from one grey picture (H, W) uint8 to another and back, as flow.found does."""
         digest = hashlib.blake2b(f"{flow.VERSION} {first.shape}".encode(), digest_size=16)
         for picture in (first, second):
             digest.update(picture)
@@ -180,7 +195,7 @@ class StoredVectors:
         return values
 
     def _kept(self, path: Path, shape: tuple[int, ...]) -> np.ndarray | None:
-        """Return the vectors in a file, or None if the file is missing, damaged or not ours."""
+        """Return the stored vectors for pictures of a shape, or None if the file is missing, damaged or another one."""
         height, width = (-(-n // STEP) for n in shape)
         spec = ImageSpec(width, height, len(_CHANNELS), "half")
         spec.channelnames = _CHANNELS
@@ -188,6 +203,7 @@ class StoredVectors:
         return None if values is None or not np.isfinite(values).all() else values
 
     def _keep(self, path: Path, values: np.ndarray) -> None:
+        """Store vectors in a file, if that is wanted. If it fails once, no more are stored."""
         if not self._writes:
             return
         try:

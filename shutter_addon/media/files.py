@@ -1,4 +1,4 @@
-"""Checks of files, names and sizes for movies and image sequences."""
+"""Checks of media files, their names and sizes, for movies and image sequences, and whether PyAV is there."""
 
 import os
 from functools import cache
@@ -15,9 +15,9 @@ MODEL = Path(__file__).resolve().parents[2] / "models" / "u2netp.onnx"  # the ne
 
 @cache
 def pyav_missing() -> str:
-    """Return Python's message if PyAV cannot be imported, else "".
+    """Return why PyAV cannot be imported (Python's message), or "" if it can.
 
-    A package without wheels lacks it. A second Blender then decodes movies (blender_movie).
+    The zip without binary packages lacks it. A second Blender then decodes movies (blender_movie).
     """
     try:
         from .movie import MovieSource  # noqa: F401
@@ -27,7 +27,11 @@ def pyav_missing() -> str:
 
 
 def check_file(path: str | Path) -> Path:
-    """Return the path of a readable file that is not empty; raise MediaError for any other."""
+    """Return the path of a readable file that is not empty.
+
+    Raises:
+        MediaError: It is something else, or missing.
+    """
     path = Path(path)
     if path.is_dir():
         raise MediaError(f"{path.name}: is a folder, not a file")
@@ -41,7 +45,7 @@ def check_file(path: str | Path) -> Path:
 
 
 def stamp(path: str | Path) -> tuple[int, int] | None:
-    """Return a value that changes when a file or a folder's entries change. None: nothing is there."""
+    """Return a value that changes when a file, or the list of a folder's entries, changes. None: nothing is there."""
     try:
         status = os.stat(path)
     except (OSError, ValueError):  # a name with a null character
@@ -50,7 +54,11 @@ def stamp(path: str | Path) -> tuple[int, int] | None:
 
 
 def check_sound(path: str | Path) -> None:
-    """Raise MediaError unless a file has sound. Without PyAV, any file passes."""
+    """Check that a file has sound. Without PyAV, any file passes.
+
+    Raises:
+        MediaError: It has none, or cannot be read.
+    """
     path = check_file(path)
     if pyav_missing():
         return
@@ -66,7 +74,11 @@ def check_sound(path: str | Path) -> None:
 
 
 def check_name(path: str | Path) -> str:
-    """Return the path as text for OpenImageIO and Blender; raise MediaError unless it is UTF-8."""
+    """Return a path as text, as OpenImageIO and Blender need it.
+
+    Raises:
+        MediaError: The path is not UTF-8.
+    """
     name = os.fspath(path)
     try:
         name.encode()
@@ -77,12 +89,20 @@ def check_name(path: str | Path) -> str:
 
 
 def check_size(name: str, width: int, height: int) -> None:
-    """Raise MediaError for a picture without pixels or with more than PIXELS."""
+    """Check the size of a picture in pixels.
+
+    Args:
+        name: The file's, for the message.
+        width, height: The size.
+
+    Raises:
+        MediaError: It has no pixels, or more than PIXELS.
+    """
     if not 0 < width * height <= PIXELS:
         raise MediaError(f"{name}: {width}×{height} are too many pixels, or none; up to 16384×16384 can be read")
 
 
 def check_index(source: FrameSource, index: int) -> None:
-    """Raise IndexError unless the source has the frame."""
+    """Raise IndexError unless the source has a frame with this index."""
     if not 0 <= index < source.count:
         raise IndexError(f"frame {index} of {source.path.name}: it has frames 0 to {source.count - 1}")

@@ -1,4 +1,4 @@
-"""Movies that are written in parts, so that an interrupted one can go on. Each part is complete or missing."""
+"""Write a movie in parts, each complete or missing, so that an interrupted bake can go on; and join the parts."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ def write_part(path: Path, pictures: Iterable[np.ndarray], fps: Fraction) -> Non
     """Write pictures as an H.264 movie, complete or not at all.
 
     Args:
-        path: the movie
-        pictures: levels (H, W, 3 or 4) uint8; alpha is ignored. Its errors are not caught.
-        fps: the frame rate
+        path: The movie.
+        pictures: Levels (H, W, 3 or 4) uint8; alpha is ignored. Errors of the iterable are not caught.
+        fps: The frame rate.
 
     Raises:
-        MediaError: the movie cannot be written
+        MediaError: The movie cannot be written.
     """
 
     def fill(container: OutputContainer) -> int:
@@ -52,7 +52,15 @@ def write_part(path: Path, pictures: Iterable[np.ndarray], fps: Fraction) -> Non
 
 
 def _write(path: Path, fill: Callable[[OutputContainer], int]) -> None:
-    """Write a movie, complete or not at all. fill: adds frames to its container and returns their number."""
+    """Write an MP4, complete or not at all.
+
+    Args:
+        path: The file.
+        fill: Adds the frames to the opened file, and returns their number.
+
+    Raises:
+        MediaError: It cannot be written.
+    """
     import av
 
     try:
@@ -66,6 +74,7 @@ def _write(path: Path, fill: Callable[[OutputContainer], int]) -> None:
 
 
 def _stream(container: OutputContainer, shape: Sequence[int], fps: Fraction) -> VideoStream:
+    """Add the stream of a part to an opened file. `shape` is the pictures' (H, W, …)."""
     stream = container.add_stream("libx264", rate=fps, options=_OPTIONS)
     stream.height, stream.width = shape[:2]
     stream.pix_fmt = "yuv420p" if shape[0] % 2 == shape[1] % 2 == 0 else "yuv444p"  # odd sizes have no halves
@@ -76,6 +85,7 @@ def _stream(container: OutputContainer, shape: Sequence[int], fps: Fraction) -> 
 
 
 def _frame(picture: np.ndarray, stream: VideoStream, index: int) -> VideoFrame:
+    """Return a picture (H, W, 3 or 4) uint8 as the frame of a stream with an index, in the stream's pixel format."""
     import av
 
     levels = np.ascontiguousarray(picture[..., :3])
@@ -93,8 +103,13 @@ def _frame(picture: np.ndarray, stream: VideoStream, index: int) -> VideoFrame:
 def join(paths: Sequence[Path], output: Path, fps: Fraction) -> None:
     """Join parts of `write_part` into one movie without encoding them again.
 
+    Args:
+        paths: The parts, in order.
+        output: The movie.
+        fps: The frame rate.
+
     Raises:
-        MediaError: a part cannot be read, or the movie cannot be written
+        MediaError: A part cannot be read, or the movie cannot be written.
     """
     import av
 

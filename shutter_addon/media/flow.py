@@ -1,4 +1,4 @@
-"""Makes new frames between two frames (moments), by optical flow (appendix B).
+"""Make moments, which are new frames between two filmed frames, by optical flow (appendix B).
 
 OpenCV finds the flow in both directions. Each vector carries a pixel to its place at the time of the new frame. Where
 several vectors arrive at one place, the one whose two ends look most alike wins (Baker et al. 2011, "A database and
@@ -31,12 +31,12 @@ SHARED = 0.5  # the share of vectors, in each direction, that have to be good
 # Where nothing moves farther than STILL between two frames, in 1 / UNIT of a pixel, moments are mixes of both frames.
 # Up to MOVES, one key moment lies between them; each doubling of the distance doubles the key moments.
 STILL, MOVES = UNIT // 8, 2 * UNIT
-_KEPT = 4  # key moments, and sets of vectors
+_KEPT = 4  # cached key moments, and cached sets of vectors
 VERSION = 2  # raise it when `found` gives something else of the same pictures
 
 
 class Between:
-    """Makes the moments between two frames. They depend on these frames only, not on the number of cores."""
+    """Makes the moments between two frames (frame_source.Pair). Nothing but these frames has an effect on them."""
 
     def __init__(
         self,
@@ -65,7 +65,7 @@ class Between:
             self._sides = sides if _meet(pictures, sides) else None
 
     def with_ends(self, first: np.ndarray, second: np.ndarray) -> Between:
-        """Return a copy that applies the same flow to two other frames."""
+        """Return a copy for two other frames (H, W, 4), to which the same flow is applied."""
         other = copy(self)
         other.ends, other._samples = (first, second), RecentValues()
         other.__dict__.pop("_encoded", None)
@@ -79,11 +79,11 @@ class Between:
         """Return one of the moments between the frames.
 
         What only one of the two frames shows is taken from it; everything else is mixed. If the frames have nothing in
-        common, it is the nearer frame.
+        common, it is the nearer frame itself.
 
         Args:
-            pair: Moment.pair.
-            number: Which moment, 1 to steps - 1.
+            pair: The numbers of the two frames, for Moment.pair.
+            number: Which moment, 1 to steps − 1.
             steps: How many equal steps lead from the first frame to the second.
         """
         if (sides := self._sides) is None:
@@ -93,7 +93,7 @@ class Between:
         return Moment(pair, self.ends, number, steps, vectors, levels, self)
 
     def rgba(self, moment: Moment) -> np.ndarray:
-        """Make the frame of a moment."""
+        """Make the frame (H, W, 4) of a moment from `moment`, in the dtype of the two frames."""
         vectors, levels, steps = moment.vectors, moment.levels, moment.steps
         height, width = self.ends[0].shape[:2]
         keys = len(vectors) + 1
@@ -124,7 +124,12 @@ class Between:
         return before + late / (late + early) * (after - before)
 
     def _light(self, vectors: np.ndarray, key: int) -> np.ndarray:
-        """Return the linear light of a key moment, (H, W, 3 or 4) float32."""
+        """Return the linear light of a key moment, (H, W, 3 or 4) float32.
+
+        Args:
+            vectors: Moment.vectors.
+            key: The key moment's number; the first and the last are the two frames.
+        """
         keys = len(vectors) + 1
         if key % keys == 0:
             return _light(self._encoded[key // keys])
@@ -132,10 +137,10 @@ class Between:
 
 
 def luma(frame: np.ndarray, transfer: str, alpha: str) -> np.ndarray:
-    """Convert a source's frame (H, W, 4) to grey display values (H, W) uint8.
+    """Convert a source's frame to grey display values (H, W) uint8.
 
     Args:
-        frame: The frame.
+        frame: (H, W, 4).
         transfer: As in FrameSource.
         alpha: As in FrameSource.
     """
@@ -145,20 +150,20 @@ def luma(frame: np.ndarray, transfer: str, alpha: str) -> np.ndarray:
 
 
 def displayed(frame: np.ndarray, transfer: str, alpha: str) -> np.ndarray:
-    """Convert a source's frame (H, W, 4) to display values (H, W, 3) uint8. Arguments as for `luma`."""
+    """Convert a source's frame to 8-bit display values (H, W, 3). Arguments as for `luma`."""
     return np.ascontiguousarray(levels(_encoded(frame, transfer, alpha))[..., :3])
 
 
 def resized(picture: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """Return a picture made smaller, or the picture itself if it has this size (width, height) already."""
+    """Return a picture reduced to this size (width, height), or the picture itself if it has it already."""
     return picture if picture.shape[1::-1] == size else cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
 
 
 def of_rows(frame: np.ndarray, source: FrameSource, most: int, *, turned: bool = False) -> np.ndarray:
-    """Return a source's frame in grey, as from `luma`, and reduced to `most` rows if it has more.
+    """Return a source's frame in grey (H, W) uint8, reduced to `most` rows if it has more.
 
     Args:
-        frame: The frame.
+        frame: (H, W, 4).
         source: Its source.
         most: The most rows.
         turned: Swap rows and columns first.
@@ -185,7 +190,7 @@ def fine_vectors(first: np.ndarray, second: np.ndarray) -> np.ndarray:
 
 
 def found(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Find the optical flow between two pictures (H, W) uint8 in both directions, for every STEPth pixel.
+    """Find the optical flow between two grey pictures (H, W) uint8 in both directions, for every STEPth pixel.
 
     Returns:
         float16 (⌈H / STEP⌉, ⌈W / STEP⌉, 6): the vector from the first picture to the second (x and y in pixels) and its
@@ -216,7 +221,7 @@ def _half(picture: np.ndarray) -> np.ndarray:
 
 
 def _dis(first: np.ndarray, second: np.ndarray, stride: int, smoothness: float = 20, quick: bool = False) -> np.ndarray:
-    """Run OpenCV's DIS optical flow. Return the vectors (H, W, 2) from the first picture's pixels to the second's.
+    """Run OpenCV's DIS optical flow.
 
     Args:
         first: (H, W) uint8.
@@ -224,6 +229,9 @@ def _dis(first: np.ndarray, second: np.ndarray, stride: int, smoothness: float =
         stride: Pixels from a patch to the next.
         smoothness: Of the vectors (OpenCV's alpha).
         quick: Refine vectors less. With a stride of 5, this takes a third of the time, and moments look as good.
+
+    Returns:
+        Vectors (H, W, 2) from the first picture's pixels to the second's, x and y in pixels.
     """
     # A new one each time: it keeps buffers, which threads must not share.
     dis = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
@@ -236,23 +244,34 @@ def _dis(first: np.ndarray, second: np.ndarray, stride: int, smoothness: float =
     height, width = first.shape
     beyond = max(SMALLEST - height, 0), max(SMALLEST - width, 0)
     wide = (cv2.copyMakeBorder(each, 0, beyond[0], 0, beyond[1], cv2.BORDER_REPLICATE) for each in (first, second))
-    # Of pictures without any structure they may be infinite.
+    # Vectors of pictures without any structure may be infinite.
     return np.nan_to_num(dis.calc(*wide, None)[:height, :width], posinf=0, neginf=0)
 
 
-# The dearest first: places and vectors (2, n), x and y in cells of STEP pixels, and costs (n,)
+# Vectors by cost, the highest first: places and vectors (2, n), x and y in cells of STEP pixels, and costs (n,).
 _Carriers = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 def _meet(pictures: list[np.ndarray], sides: list[_Carriers]) -> bool:
-    """Return whether two pictures show the same things: enough vectors have ends that look alike."""
+    """Return whether two pictures show the same things: whether enough vectors have ends that look alike.
+
+    Args:
+        pictures: Grey pictures (H, W) uint8.
+        sides: The vectors from each to the other.
+    """
     brightness = max(float(each.mean()) for each in pictures)
     unlike = max(UNLIKE * min(brightness / GREY, 1.0), NOISE)
     return min(float((costs[1:] <= unlike).mean()) for _places, _vectors, costs in sides) >= SHARED
 
 
 def _of_keys(sides: list[_Carriers], shape: tuple[int, ...], keys: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return Moment.vectors and Moment.levels of so many key moments between two pictures of a shape (H, W)."""
+    """Return Moment.vectors and Moment.levels for a number of key moments between two frames.
+
+    Args:
+        sides: The vectors from each frame to the other.
+        shape: The frames' (H, W).
+        keys: Into how many parts key moments divide the time between the frames, a power of two.
+    """
     paths = np.stack([_paths(sides, shape, key / keys) for key in range(1, keys)])
     way = paths[..., :2]
     most, least = (each.astype(np.float32) - ZERO for each in (way.max(axis=0), way.min(axis=0)))
@@ -268,7 +287,7 @@ def _of_keys(sides: list[_Carriers], shape: tuple[int, ...], keys: int) -> tuple
 
 
 def _paths(sides: list[_Carriers], shape: tuple[int, ...], t: float) -> np.ndarray:
-    """Return the vectors (h, w, 4) of Moment.vectors at a time from 0 to 1."""
+    """Return the vectors (h, w, 4) of Moment.vectors at a time from 0 (the first frame) to 1 (the second)."""
     (forth, cost), (back, other) = (_carry(*side, shape, s) for side, s in zip(sides, (t, 1 - t), strict=True))
     vectors = np.where(cost <= other, forth, -back).transpose(1, 2, 0)
     arrived = [each < np.inf for each in (cost, other)]
@@ -283,26 +302,27 @@ def _paths(sides: list[_Carriers], shape: tuple[int, ...], t: float) -> np.ndarr
 def _carry(
     places: np.ndarray, vectors: np.ndarray, costs: np.ndarray, shape: tuple[int, ...], t: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Carry vectors to a time.
+    """Carry the vectors from one frame to the other to where they pass at a time.
 
     Args:
         places: See _Carriers, as for `vectors` and `costs`.
         vectors: Likewise.
         costs: Likewise.
-        shape: Of the picture, (H, W).
-        t: The time, from 0 at the first frame to 1 at the second.
+        shape: The frames' (H, W).
+        t: The time, from 0 at the frame where the vectors start to 1 at the other.
 
     Returns:
-        The vectors (2, h, w) that arrive at every STEPth pixel, and their costs (h, w), infinite where none arrives.
+        The vectors (2, h, w) that pass every STEPth pixel, and their costs (h, w), infinite where none passes.
     """
     h, w = (-(-n // STEP) for n in shape)
     stopping.check()
-    # A margin of two takes what leaves the picture. Of whole numbers that are not negative, conversion is `floor`.
+    # What leaves the picture goes into a margin of two cells. For numbers that are not negative, conversion is `floor`.
     x, y = (
         (place + np.float32(t) * vector).clip(0, end).astype(np.int32)
         for place, vector, end in zip(places, vectors, (w + 2, h + 2), strict=True)
     )
-    # Of several that arrive the cheapest stays, the last; where nothing arrives, it is what is put first.
+    # Costs descend, so where several arrive, the last assignment is the cheapest. Where none arrives, the first vector
+    # stays, whose cost is infinite.
     last = np.zeros((h + 4) * (w + 4), np.int32)
     last[y * (w + 4) + x] = np.arange(len(costs), dtype=np.int32)
     last = last.reshape(h + 4, w + 4)[1:-2, 1:-2]
@@ -313,7 +333,7 @@ def _carry(
 
 
 def _carriers(side: np.ndarray) -> _Carriers:
-    """Return the carriers from the three values of one direction in the result of `found`.
+    """Return vectors in the form of _Carriers, from one direction of the result of `found`, (h, w, 3).
 
     The first one has an infinite cost. It stands for none. Places count from the corner of the margin of `_carry`.
     """
@@ -321,7 +341,7 @@ def _carriers(side: np.ndarray) -> _Carriers:
     # As whole numbers, which NumPy sorts ten times as fast; costs are not negative.
     order = np.argsort(~cost.view(np.uint16), kind="stable")
     row, column = np.divmod(order, side.shape[1])
-    # Of pixels of half the size, whose middle lies half a pixel further.
+    # The flow was found at half the size, where the middle of a pixel is half a pixel further.
     places = np.stack([column, row]).astype(np.float32) + np.float32(2 + 0.5 / STEP)
     x, y, cost = (each.ravel()[order].astype(np.float32) for each in np.moveaxis(side, 2, 0))
     vectors = np.stack([x, y]) / np.float32(STEP)
@@ -329,7 +349,12 @@ def _carriers(side: np.ndarray) -> _Carriers:
 
 
 def _filled(vectors: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Fill unknown vectors (h, w, 2) with the mean of known ones around them, from coarser and coarser pictures."""
+    """Fill unknown vectors (h, w, 2) with the mean of known ones around them, by ever coarser copies.
+
+    Args:
+        vectors: The vectors.
+        known: Which of them are known, (h, w) bool.
+    """
     if known.all() or not known.any():
         return vectors
     weight = known.astype(np.float32)
@@ -341,12 +366,19 @@ def _filled(vectors: np.ndarray, known: np.ndarray) -> np.ndarray:
 
 
 def _mixed(ends: list[np.ndarray], vectors: np.ndarray, key: int, keys: int) -> np.ndarray:
-    """Return the display values of a key moment: both frames, looked up along the paths and mixed.
-
-    The values are uint16 for frames of whole numbers.
+    """Return the display values (H, W, C) of a key moment: both frames, looked up along the paths and mixed.
 
     Places are whole numbers of 1 / UNIT of a pixel, so that all devices look up the same ones
     (shaders/include/moment.glsl).
+
+    Args:
+        ends: The display values of the two frames, from `_encoded`.
+        vectors: Those of the key moment, from Moment.vectors.
+        key: Its number.
+        keys: Into how many parts key moments divide the time between the frames.
+
+    Returns:
+        uint16 if frames are whole numbers, else float32.
     """
     stopping.check()
     height, width = ends[0].shape[:2]
@@ -367,7 +399,7 @@ def _mixed(ends: list[np.ndarray], vectors: np.ndarray, key: int, keys: int) -> 
 
 
 def _spread(values: np.ndarray, height: int, width: int) -> np.ndarray:
-    """Interpolate values (h, w, C) of every STEPth pixel for all pixels.
+    """Interpolate values (h, w, C) of every STEPth pixel for all pixels of a picture of this size.
 
     Returns:
         int32 (H, W, C): the interpolated values, times STEP².
@@ -401,7 +433,7 @@ def look(picture: np.ndarray, places: np.ndarray) -> np.ndarray:
 
 @lru_cache(maxsize=2)  # 16 MB at 4K, and a fourth of that
 def grid(height: int, width: int) -> np.ndarray:
-    """Return the places (H, W, 2) of all pixels, x and y."""
+    """Return the places (H, W, 2) of all pixels, x and y in pixels."""
     return np.dstack(np.meshgrid(*(np.arange(n, dtype=np.float32) for n in (width, height))))
 
 
@@ -417,7 +449,7 @@ def _encoded(frame: np.ndarray, transfer: str, alpha: str) -> np.ndarray:
         return np.ascontiguousarray(frame[..., :3])
     white = np.iinfo(frame.dtype).max if frame.dtype.kind == "u" else 1
     rgba = frame.astype(np.float32) / np.float32(white)
-    # One infinite sample would make NaN of all that interpolation takes it into.
+    # Interpolation would turn everything around an infinite sample into NaN.
     rgba = np.nan_to_num(rgba, copy=False, nan=0, posinf=HALF_MAX, neginf=-HALF_MAX)
     convert = light.to_encoded if transfer == "linear" else None
     if alpha == "opaque":
@@ -426,7 +458,7 @@ def _encoded(frame: np.ndarray, transfer: str, alpha: str) -> np.ndarray:
 
 
 def levels(samples: np.ndarray) -> np.ndarray:
-    """Convert samples to 8-bit levels."""
+    """Convert samples of display values (uint8, uint16, or floats from 0 to 1) to levels uint8."""
     if samples.dtype == np.uint16:
         return (samples >> 8).astype(np.uint8)
     if samples.dtype != np.uint8:
@@ -435,7 +467,7 @@ def levels(samples: np.ndarray) -> np.ndarray:
 
 
 def _light(samples: np.ndarray) -> np.ndarray:
-    """Return display values of `_encoded` as linear light."""
+    """Convert display values of `_encoded` to linear light, float32, premultiplied."""
     if samples.dtype.kind == "u":
         return _table(samples.dtype)[samples]
     if samples.shape[2] == 3:
@@ -446,13 +478,20 @@ def _light(samples: np.ndarray) -> np.ndarray:
 
 @cache
 def _table(dtype: np.dtype) -> np.ndarray:
-    """Return the linear light of every display value of a whole-number type."""
+    """Return the linear light of every display value of a whole-number dtype, so that it need not be computed."""
     white = np.iinfo(dtype).max
     return light.to_linear(np.arange(white + 1) / white).astype(np.float32)
 
 
 def _decoded(frame: np.ndarray, dtype: np.dtype, transfer: str, alpha: str) -> np.ndarray:
-    """Convert linear, premultiplied light to a FrameSource's frame."""
+    """Convert linear, premultiplied light (H, W, 3 or 4) to a frame (H, W, 4) as a FrameSource has it.
+
+    Args:
+        frame: The light.
+        dtype: The source's.
+        transfer: The source's.
+        alpha: The source's.
+    """
     convert = light.to_encoded if transfer == "srgb" else np.asarray
     if alpha == "opaque":
         frame = np.dstack([convert(frame), np.ones(frame.shape[:2], np.float32)])
@@ -463,5 +502,5 @@ def _decoded(frame: np.ndarray, dtype: np.dtype, transfer: str, alpha: str) -> n
     if dtype.kind == "u":
         white = np.iinfo(dtype).max
         return np.rint(np.clip(frame, 0, 1) * np.float32(white)).astype(dtype)
-    limits = np.finfo(dtype)  # which interpolation may pass
+    limits = np.finfo(dtype)  # interpolation can exceed them
     return np.clip(frame, limits.min, limits.max).astype(dtype)

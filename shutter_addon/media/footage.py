@@ -1,4 +1,4 @@
-"""Small grey pictures of a strip, for tracking."""
+"""Small grey pictures of the footage at timeline frames, for tracking."""
 
 from collections.abc import Callable, Sequence
 
@@ -16,18 +16,21 @@ KEPT = 256  # pictures that are cached, half a megabyte each
 
 
 class Footage:
-    """Small grey pictures of a strip, for tracking.
+    """Gives tracking small grey pictures of the footage at timeline frames, and tells where cuts are.
 
     Attributes:
-        size: (width, height) of the pictures
+        size: (width, height) of the pictures.
     """
 
     def __init__(self, source: FrameSource, index_at: Callable[[int], int]) -> None:
-        """Take pictures of a source; raise MediaError without OpenCV.
+        """Take pictures of a source.
 
         Args:
-            source: the footage
-            index_at: returns the source frame that is shown at a timeline frame
+            source: The footage.
+            index_at: Returns the source frame that is shown at a timeline frame.
+
+        Raises:
+            MediaError: OpenCV is missing.
         """
         opencv.check("tracking needs")
         self._source, self._index_at = source, index_at
@@ -37,11 +40,16 @@ class Footage:
         self._wanted: Sequence[int] = ()
 
     def want(self, frames: Sequence[int]) -> None:
-        """Announce the next timeline frames, in order."""
+        """Announce the timeline frames whose pictures will be asked for next, in order."""
         self._wanted = frames
 
     def picture(self, frame: int) -> np.ndarray:
-        """Return the picture (H, W) uint8 at a timeline frame. Tracking can be stopped here (core.stopping)."""
+        """Return the picture (H, W) uint8 at a timeline frame.
+
+        Raises:
+            core.stopping.StoppedError: Tracking was cancelled.
+            MediaError: The frame cannot be read.
+        """
         stopping.check()
         index = self._index_at(frame)
         if index not in self._kept:
@@ -54,11 +62,15 @@ class Footage:
         return self._cut(min(first, second), max(first, second))
 
     def _cut(self, low: int, high: int) -> bool:
+        """Return whether there is a cut between two source frames, `low` and the later `high`."""
         shots = self._source.shots
         return shots is not None and low != high and high not in shots.around(low, low, high)
 
     def _read(self, frame: int, index: int) -> None:
-        """Read the source frame at a timeline frame. If tracking goes backward, read a block of frames."""
+        """Read the source frame `index`, which a timeline frame shows, or a block of frames if tracking goes backward.
+
+        Movies are decoded forward, so a block takes little longer than its first frame.
+        """
         before, upcoming = index, list[int]()  # the frame shown before it, and the next ones that are not cached
         if frame in self._wanted:
             place = self._wanted.index(frame)

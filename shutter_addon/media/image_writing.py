@@ -1,4 +1,4 @@
-"""Writes arrays as pictures: EXR files with any channels, and grey PNG files. Each is complete or not written."""
+"""Write arrays as pictures: EXR files with any channels, and grey PNG files. Each is complete or not written."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,13 +16,13 @@ def write_exr(path: Path, values: np.ndarray, names: Sequence[str], note: str = 
     """Write an EXR file.
 
     Args:
-        path: the file
-        values: (height, width, channels); half floats stay so, all others become float32
-        names: of the channels
-        note: metadata that rendered_pictures reads
+        path: The file.
+        values: (height, width, channels); half floats stay so, all others become float32.
+        names: Of the channels.
+        note: Metadata that tells which edit the picture belongs to (job_file.note), or "".
 
     Raises:
-        MediaError: it cannot be written
+        MediaError: It cannot be written.
     """
     samples = values if values.dtype == np.float16 else np.asarray(values, np.float32)
     # The date is not the time of writing, so that equal samples make equal files.
@@ -31,16 +31,35 @@ def write_exr(path: Path, values: np.ndarray, names: Sequence[str], note: str = 
 
 
 def write_grey(path: Path, values: np.ndarray) -> None:
-    """Write values (height, width) float32, 0 … 1, as a 16-bit PNG; raise MediaError if that fails."""
+    """Write values (height, width) float32, 0 … 1, as a 16-bit PNG.
+
+    Raises:
+        MediaError: It cannot be written.
+    """
     _write(path, np.rint(values[..., None] * np.float32(65535)).astype(np.uint16), {})
 
 
 def write_levels(path: Path, levels: np.ndarray, description: str) -> None:
-    """Write levels (height, width) uint8 as an 8-bit PNG with a description; raise MediaError if that fails."""
+    """Write levels (height, width) uint8 as an 8-bit PNG with a description in its metadata.
+
+    Raises:
+        MediaError: It cannot be written.
+    """
     _write(path, levels[..., None], {"ImageDescription": description})
 
 
 def _write(path: Path, samples: np.ndarray, attributes: dict[str, str], names: Sequence[str] = ()) -> None:
+    """Write samples (height, width, channels) as the picture file that the path's ending names.
+
+    Args:
+        path: The file.
+        samples: Of any type that the format has.
+        attributes: Metadata, {name: text}.
+        names: Of the channels; empty: the usual ones.
+
+    Raises:
+        MediaError: It cannot be written.
+    """
     height, width, channels = samples.shape
     kind = {"float16": "half", "float32": "float"}.get(samples.dtype.name, samples.dtype.name)
     spec = OpenImageIO.ImageSpec(width, height, channels, kind)

@@ -1,4 +1,4 @@
-"""Values of mattes: files, masks and ramps at a picture's pixels, feathered and inverted."""
+"""Read mattes: values from files, masks, outlines and ramps for a picture's pixels, feathered and inverted."""
 
 from __future__ import annotations
 
@@ -19,28 +19,36 @@ Late = Callable[[Any, int], None]
 
 
 class MatteValues:
-    """A core.model.mattes.MatteReader for pictures of one size."""
+    """Reads the values of mattes (core.model.mattes.MatteReader) for pictures of one size."""
 
     def __init__(self, width: int, height: int, step: int = 1, late: Late | None = None) -> None:
-        """Read mattes.
+        """Prepare to read mattes.
 
         Args:
-            width: of the pictures
-            height: of the pictures
-            step: source frames for each filmed one (Options.step)
-            late: called with the file and frame of each matte that is not carried yet; a straight one is used instead.
-                None: it is carried.
+            width, height: Of the pictures.
+            step: Source frames for each filmed one (Options.step).
+            late: Called with the file and the frame of each matte of an outline that is not tracked to this frame yet.
+                The straight outline is used instead. None: such a matte is tracked now, which takes time.
         """
         self._size, self._step, self._late = (width, height), step, late
         self._sources: dict[SourceFile, FrameSource] = {}
         self._made: list[tuple[Hashable, np.ndarray]] = []
 
     def another(self) -> MatteValues:
-        """See MatteReader."""
+        """Return a new reader for pictures of the same size, with files of its own."""
         return MatteValues(*self._size, self._step, self._late)
 
     def values(self, mattes: tuple[Matte, ...], index: int, block: int) -> list[tuple[Hashable, np.ndarray]]:
-        """See MatteReader. Raise EffectError or MediaError if a file cannot be read."""
+        """Return a key and the values of each matte in a frame (MatteReader.values).
+
+        Args:
+            mattes: The mattes.
+            index: The shown source frame.
+            block: The side of the blocks of pixels that share a value.
+
+        Raises:
+            EffectError, MediaError: A file cannot be read.
+        """
         files = {matte.content.file for matte in mattes if isinstance(matte.content, FileFrame)}
         if len(self._sources.keys() | files) > MOST_OPEN:
             for file in self._sources.keys() - files:
@@ -53,7 +61,7 @@ class MatteValues:
         return list(self._made)
 
     def _content(self, content: Content, index: int) -> tuple[Hashable, Callable[[], np.ndarray]]:
-        """Return a key of a matte's content at a source frame, and a function that reads it. Its file is opened."""
+        """Return a key of a matte's content at a source frame, and a function that reads its values. Open its file."""
         if not isinstance(content, FileFrame):
             return content, partial(content.values, *self._size)
         file, late = content.file, self._late
@@ -71,6 +79,13 @@ class MatteValues:
         return (file, frame, True), straight
 
     def _values(self, matte: Matte, shown: np.ndarray, block: int) -> np.ndarray:
+        """Return the values of a matte for blocks of pixels: those of its content, fitted, feathered and inverted.
+
+        Args:
+            matte: The matte.
+            shown: The values (h, w) of its content, 0 to 1.
+            block: The side of the blocks.
+        """
         values = feathered(fitted(shown, *self._size), matte.feather * self._size[1])
         return block_means(1 - values if matte.invert else values, block)
 

@@ -1,4 +1,4 @@
-"""Movies: the frames that Blender's movie strip shows, converted to RGB as in Blender."""
+"""Movies: the frames that Blender's movie strip shows, decoded by PyAV and converted to RGB as in Blender."""
 
 import math
 import re
@@ -39,7 +39,7 @@ _PLANAR_YUV = re.compile(r"yuv[aj]?4\d\dp(\d+le)?")
 
 
 class MovieSource(FrameSource):
-    """A movie's frames.
+    """A movie, decoded by PyAV. It gives the frames that a movie strip of Blender shows.
 
     Frame i is on screen at the stream's start + i / fps: the last one whose time stamp is not later, or the first
     frame. So frames repeat or are skipped if the rate varies, and the last one repeats while sound goes on. 8-bit
@@ -49,7 +49,7 @@ class MovieSource(FrameSource):
     transfer = "srgb"
 
     def __init__(self, path: str | Path, *, stream: int = 0, deinterlace: bool = False, divisor: int = 1) -> None:
-        """Open a movie. See opening.open_source."""
+        """Open a movie. Arguments and errors as for opening.open_source."""
         self.path = check_file(path)
         self.files = [self.path]
         self._deinterlace, self._divisor = deinterlace, divisor
@@ -67,6 +67,11 @@ class MovieSource(FrameSource):
             raise
 
     def _probe(self) -> None:
+        """Read the movie's properties from its header and first frame.
+
+        Raises:
+            MediaError: Its length is unknown, or no frame can be decoded.
+        """
         file, first = self._reader.first()
         codec = file.stream.codec_context
         profile = f" ({codec.profile})" if codec.profile else ""
@@ -96,14 +101,18 @@ class MovieSource(FrameSource):
         return as_rgba(self.decoded(index))
 
     def _picture(self, index: int, frame: av.VideoFrame) -> np.ndarray:
+        """Return the RGBA pixels of a decoded frame. The index is for errors."""
         with self._named(index):
             return self._pixels(frame)
 
     def decoded(self, index: int) -> Decoded:
-        """Return the frame as RGBA, or its planes if the GPU can convert them.
+        """Return the frame as RGBA (H, W, 4), or as planes of luma and chroma if a GPU can convert these.
 
         Those are 8-bit 4:2:0 planes in BT.601 or BT.709 that need no scaling, rotation or deinterlacing. They are views
         of the decoder's memory. Converted by their matrix, they equal `read` to the bit.
+
+        Raises:
+            MediaError: The frame cannot be decoded.
         """
         with self._named(index):
             frame = self._frame(index)
@@ -113,7 +122,10 @@ class MovieSource(FrameSource):
             return Planes(luma=luma, chroma=(cb, cr), matrix=to_rgb, rgba=partial(self._picture, index, frame))
 
     def grey(self, index: int) -> np.ndarray | None:
-        """Return the frame's luma (height, width, 1) if it is the luminance of its colors, else None."""
+        """Return the frame's luma (height, width, 1) as a matte's luminance, or None if the frame has colors.
+
+        In a frame without colors, luma is the luminance of RGB.
+        """
         with self._named(index):
             frame = self._frame(index)
             if not _is_grey(frame):
@@ -121,6 +133,7 @@ class MovieSource(FrameSource):
             return self._upright(self._converted(frame, "gray16le" if self.dtype == np.uint16 else "gray"))[..., None]
 
     def _frame(self, index: int) -> av.VideoFrame:
+        """Return the decoded frame of an index, with the tags by which it is converted to RGB."""
         check_index(self, index)
         frame = self._reader.frame_at(self._reader.start + _round(index * self._step), self._step)
         if not frame.format.is_rgb:
@@ -133,7 +146,7 @@ class MovieSource(FrameSource):
 
     @contextmanager
     def _named(self, index: int) -> Iterator[None]:
-        """Turn errors into a MediaError that names the frame."""
+        """Turn errors inside this context into a MediaError that names the frame."""
         try:
             yield
         except (av.error.FFmpegError, MediaError) as error:
@@ -141,7 +154,7 @@ class MovieSource(FrameSource):
             raise MediaError(f"frame {index} of {self.path.name} cannot be decoded: {why}") from error
 
     def _matrix(self, frame: av.VideoFrame) -> Matrix | None:
-        """Return the matrix from the frame's planes to RGB, or None if it needs more conversions."""
+        """Return the matrix that converts a frame's planes to RGB, or None if they need more than that."""
         if frame.format.name not in _PLANAR_420 or self._deinterlace or self._turns:
             return None
         if (frame.width, frame.height) != self._size or self._scaler != SCALER:
@@ -149,6 +162,7 @@ class MovieSource(FrameSource):
         return matrix(frame.colorspace, frame.format.name == "yuvj420p" or self._is_full)
 
     def _pixels(self, frame: av.VideoFrame) -> np.ndarray:
+        """Return the RGBA pixels (H, W, 4) of a decoded frame: converted, deinterlaced, reduced and upright."""
         has_fields = frame.format.name in _WITH_FIELDS and frame.width % 4 == 0 and frame.height % 4 == 0
         by_fields = self._deinterlace and has_fields
         frame = _interpolate_fields(frame) if by_fields else frame
@@ -160,6 +174,7 @@ class MovieSource(FrameSource):
         return self._upright(picture)
 
     def _converted(self, frame: av.VideoFrame, pix_fmt: str) -> np.ndarray:
+        """Return a decoded frame as an array in a pixel format of FFmpeg."""
         with self._converting:
             # Converting to planes and then to packed colors takes libswscale half the time of converting directly.
             if pix_fmt == "rgba" and _is_opaque_yuv(frame.format):
@@ -167,6 +182,7 @@ class MovieSource(FrameSource):
             return self._reformatted(self._to_packed, frame, pix_fmt).to_ndarray()
 
     def _reformatted(self, by: VideoReformatter, frame: av.VideoFrame, pix_fmt: str) -> av.VideoFrame:
+        """Return a decoded frame in another pixel format of FFmpeg, and in the size that is wanted."""
         if frame.interlaced_frame or not _TELLS_CHROMA:  # libswscale would scale each field by itself
             frame = _untold(frame)
         samples = ColorRange.JPEG if frame.format.is_rgb else frame.color_range
@@ -174,17 +190,21 @@ class MovieSource(FrameSource):
         return by.reformat(frame, width, height, pix_fmt, None, None, self._scaler, samples, ColorRange.JPEG)
 
     def _upright(self, picture: np.ndarray) -> np.ndarray:
+        """Return a picture rotated as the movie's header asks for, in memory of its own."""
         return np.require(np.rot90(picture, self._turns), requirements=["C", "W"])
 
     def close(self) -> None:
-        """Close the file and end all threads. A later read opens it again."""
+        """Close the file and end the decoder's threads. A later read opens it again."""
         self._reader.close()
         with self._converting:
             self._to_planes, self._to_packed = VideoReformatter(), VideoReformatter()
 
 
 def _untold(frame: av.VideoFrame) -> av.VideoFrame:
-    """Return a copy of a frame without marks for fields and for the position of chroma, which PyAV cannot clear."""
+    """Return a copy of a frame without marks for fields and for the position of chroma, which PyAV cannot clear.
+
+    libswscale would heed these marks, and Blender's conversion does not.
+    """
     copy = av.VideoFrame(frame.width, frame.height, frame.format.name)
     for own, plane in zip(frame.planes, copy.planes, strict=True):
         rows = np.frombuffer(own, np.uint8)[: own.height * own.line_size].reshape(own.height, own.line_size)
@@ -197,12 +217,12 @@ def _untold(frame: av.VideoFrame) -> av.VideoFrame:
 
 
 def _is_opaque_yuv(pixels: VideoFormat) -> bool:
-    """Return whether a format has luma and chroma, and no alpha."""
+    """Return whether a pixel format has luma and chroma, and no alpha."""
     return not pixels.is_rgb and len(pixels.components) == 3 and not any(each.is_alpha for each in pixels.components)
 
 
 def _is_grey(frame: av.VideoFrame) -> bool:
-    """Return whether a frame's luma is the luminance of its RGB: its chroma is neutral or missing."""
+    """Return whether the luma of a decoded frame is the luminance of its RGB: whether chroma is neutral or missing."""
     name, bits = frame.format.name, frame.format.components[0].bits
     if name.startswith("gray"):
         return True
@@ -217,7 +237,7 @@ def _round(x: float) -> int:
 
 
 def _count(container: InputContainer, stream: VideoStream, fps: Fraction) -> int:
-    """Return the movie's length from its container, as in Blender, without decoding. 0: unknown."""
+    """Return the number of a movie's frames by its header, as Blender finds it without decoding. 0: unknown."""
     if not fps:
         return 0
     time_base = fraction(stream.time_base)
@@ -231,11 +251,12 @@ def _count(container: InputContainer, stream: VideoStream, fps: Fraction) -> int
 
 
 def _start(stream: Stream) -> float:
+    """Return when a stream starts, in seconds."""
     return float((stream.start_time or 0) * fraction(stream.time_base))
 
 
 def _interpolate_fields(frame: av.VideoFrame) -> av.VideoFrame:
-    """Return a copy of the frame, its odd rows filtered with (-1 4 2 4 -1)/8 down the columns."""
+    """Deinterlace a frame as Blender does: a copy whose odd rows are filtered with (-1 4 2 4 -1)/8 down the columns."""
     result = av.VideoFrame(frame.width, frame.height, frame.format.name)
     result.colorspace, result.color_range = frame.colorspace, frame.color_range
     for source, target in zip(frame.planes, result.planes, strict=True):
@@ -247,9 +268,17 @@ def _interpolate_fields(frame: av.VideoFrame) -> av.VideoFrame:
 
 
 def _blur_rows(picture: np.ndarray, opaque: bool) -> np.ndarray:
-    """Return a copy of the RGBA picture, filtered with (1 2 1)/4 along columns, from the bottom row upward.
+    """Deinterlace a picture of a format whose fields Blender does not interpolate, as Blender does: blur its rows.
 
-    The remainder of rounding goes over to the next row. Like Blender, it skips the red of opaque pictures.
+    The filter is (1 2 1)/4 along columns, from the bottom row upward. The remainder of rounding goes over to the next
+    row. Like Blender, it skips the red of opaque pictures.
+
+    Args:
+        picture: RGBA (H, W, 4).
+        opaque: Whether the movie has no alpha.
+
+    Returns:
+        A copy.
     """
     result = picture.copy()
     rows = result[::-1, :, 1:] if opaque else result[::-1]
@@ -261,6 +290,6 @@ def _blur_rows(picture: np.ndarray, opaque: bool) -> np.ndarray:
 
 
 def _samples_of(plane: VideoPlane, dtype: DTypeLike = np.uint8) -> np.ndarray:
-    """Return a plane's samples as a view (height, width) of its memory."""
+    """Return the samples of a frame's plane as a view (height, width) of its memory."""
     samples = np.frombuffer(plane, dtype)
     return samples.reshape(-1, plane.line_size // samples.itemsize)[: plane.height, : plane.width]

@@ -1,4 +1,4 @@
-"""OpenCV, which is missing in a package without wheels."""
+"""OpenCV (`cv2`), or None where it is missing, as in the zip without binary packages."""
 
 from ..core.messages import MediaError
 
@@ -11,13 +11,14 @@ __all__ = ["check", "cv2"]
 
 
 def check(what: str, module: str = "") -> None:
-    """Raise MediaError if OpenCV, or one of its contributed modules, is missing.
-
-    Another add-on may bring an OpenCV without these modules.
+    """Check that OpenCV, and a contributed module of it, can be used. Another add-on may bring one without modules.
 
     Args:
-        what: the beginning of the message, such as "tracking needs"
-        module: the name of the contributed module
+        what: The beginning of the message, such as "tracking needs".
+        module: The name of the contributed module, or "".
+
+    Raises:
+        MediaError: One of them is missing.
     """
     if cv2 is None or (module and not hasattr(cv2, module)):
         raise MediaError(

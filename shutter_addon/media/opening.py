@@ -1,5 +1,7 @@
-"""Opens movies and image sequences, whose frames are counted as in Blender's strips. And mattes in files: a channel of
-a movie, of an image sequence or of a picture, as values 0 … 1."""
+"""Open footage and matte files: movies and image sequences, whose frames are counted as in Blender's strips.
+
+A matte is a channel of a movie, of an image sequence or of a picture, as values 0 … 1.
+"""
 
 from __future__ import annotations
 
@@ -31,20 +33,20 @@ def open_source(
     deinterlace: bool = False,
     divisor: int = 1,
 ) -> FrameSource:
-    """Open a movie, or the image sequence that starts with the file `path`.
+    """Open a movie, or the image sequence that starts with a file.
 
     Args:
-        path: the file
-        stream: the number of a movie's video stream
-        files: the file names of an image strip, one for each frame. None: those found beside `path`.
+        path: The file.
+        stream: Which of a movie's video streams.
+        files: The file names of an image strip, one for each frame. None: those found beside `path`.
         colorspace: Blender's name of the strip's color space. None: what Blender assumes for such a file.
-        config: the OpenColorIO configuration, needed for color spaces other than sRGB and Linear Rec.709
-        alpha: an image strip's alpha mode, "straight" or "premultiplied". None: what Blender assumes.
-        deinterlace: a movie strip's option
-        divisor: the factor by which frames are reduced to each side, one of reduced.DIVISORS
+        config: The OpenColorIO configuration, needed for color spaces other than sRGB and Linear Rec.709.
+        alpha: An image strip's alpha mode, "straight" or "premultiplied". None: what Blender assumes.
+        deinterlace: The option of a movie strip.
+        divisor: The factor by which both sides of frames are reduced, one of reduced.DIVISORS.
 
     Raises:
-        MediaError: it cannot be read
+        MediaError: It cannot be read.
     """
     path = Path(path)
     source: FrameSource
@@ -60,12 +62,12 @@ def open_source(
 
 
 def with_proxy(source: FrameSource, path: Path, **how: Any) -> FrameSource:
-    """Return a source that reads the frames from a proxy, or the source itself if the proxy does not fit.
+    """Return a source that reads the frames of another one from a proxy, or that one itself if the proxy does not fit.
 
     Args:
-        source: the footage
-        path: the proxy's
-        how: arguments of open_source
+        source: The footage.
+        path: The proxy's file.
+        how: Arguments of open_source for the proxy.
     """
     try:
         proxy = open_source(path, **how)
@@ -78,11 +80,12 @@ def with_proxy(source: FrameSource, path: Path, **how: Any) -> FrameSource:
 
 
 def _is_movie(path: Path, files: Sequence[str | Path] | None) -> bool:
+    """Return whether a path is that of a movie: it is not in an image strip's list, and not named as an image."""
     return files is None and path.suffix.lower() not in IMAGE_SUFFIXES
 
 
 def _opened_movie(path: Path, stream: int, deinterlace: bool = False, divisor: int = 1) -> FrameSource:
-    """See open_source."""
+    """Open a movie by PyAV or, where that is missing, by a second Blender. Arguments and errors as for open_source."""
     if pyav_missing():
         check_file(path)
         if stream or not is_lent():
@@ -97,9 +100,13 @@ def _opened_movie(path: Path, stream: int, deinterlace: bool = False, divisor: i
 
 
 def movie_channel(movie: FrameSource, channel: str) -> FrameSource:
-    """Return one channel of a movie's frames as samples (height, width, n).
+    """Return a source of one channel of a movie's frames, as samples (height, width, n).
 
     n is 3 (RGB) for the luminance of colors, 0 for the alpha of an opaque movie, else 1.
+
+    Args:
+        movie: The movie.
+        channel: A key of sequence.CHANNELS.
     """
     grey_of = getattr(movie, "grey", lambda _index: None)  # BlenderMovie has no `grey`
 
@@ -114,14 +121,14 @@ def movie_channel(movie: FrameSource, channel: str) -> FrameSource:
 
 @dataclass(frozen=True)
 class MatteFile:
-    """The file of a matte.
+    """A matte file, and which channel of it is the matte (a frame_source.SourceFile).
 
     Attributes:
-        path: a movie, a picture, or the first file of an image sequence
-        channel: luminance, red, green, blue, alpha, or the name of a channel of an EXR
-        files: the file names of an image strip, one for each frame. None: those found beside `path`.
-        stream: the number of a movie's video stream
-        stamp: differs when another file takes its place
+        path: A movie, a picture, or the first file of an image sequence.
+        channel: luminance, red, green, blue, alpha, or the name of a channel of an EXR.
+        files: The file names of an image strip, one for each frame. None: those found beside `path`.
+        stream: Which of a movie's video streams.
+        stamp: Differs if another file takes its place, so that MatteFiles compare unequal.
     """
 
     path: Path
@@ -131,13 +138,14 @@ class MatteFile:
     stamp: Hashable = None
 
     def open(self) -> SourceWrapper:
-        """Open the matte's frames (core.frames.frame_source.SourceFile), for one thread at a time.
+        """Open the source of the matte's values (height, width) float32, 0 … 1, for one thread at a time.
 
-        Each frame is a new array of the stored samples: without a transfer function or color space, with alpha neither
-        multiplied nor divided. A movie's range is expanded to 0 … 1, NaN becomes 0. Luminance has Rec.709's weights.
+        Values are the stored samples: without a transfer function or color space, with alpha neither multiplied nor
+        divided. A movie's range is expanded to 0 … 1, and NaN becomes 0. Luminance has Rec.709's weights. Each frame is
+        a new array.
 
         Raises:
-            MediaError: it cannot be read, or has no such channel
+            MediaError: It cannot be read, or has no such channel.
         """
         source: FrameSource
         if not _is_movie(self.path, self.files):
@@ -150,7 +158,10 @@ class MatteFile:
 
 
 def _values(samples: np.ndarray) -> np.ndarray:
-    """Return values (h, w) of samples (h, w, n): RGB, one channel, or none for opaque files."""
+    """Return a matte's values (h, w) float32, 0 … 1, for the samples (h, w, n) of a channel.
+
+    With n = 3 (RGB) they are the luminance, with n = 0 (the alpha of an opaque file) 1.
+    """
     if samples.shape[2] == 0:
         return np.ones(samples.shape[:2], np.float32)
     values = samples[..., 0]

@@ -1,4 +1,4 @@
-"""Finds outlines: traces the curves around a matte, and proposes the outline of a subject from a stroke or a lasso.
+"""Find outlines: trace the curves around a matte, and propose the outline of a subject from a stroke or a lasso.
 
 Proposals use GrabCut (Rother et al. 2004), which separates the colours of the subject from those around it along edges.
 """
@@ -20,11 +20,11 @@ SPOT = 6.0  # pixels: what covers no more of them is no part of a subject
 
 
 def proposed(picture: np.ndarray, drawn: np.ndarray, *, encloses: bool) -> Curves:
-    """Propose the outline of a subject.
+    """Propose the outline of a subject in a picture.
 
     Args:
         picture: (H, W, 3) uint8.
-        drawn: What strokes cover, or what a lasso encloses: (h, w) bool, of carrying.working_size.
+        drawn: The pixels that the user's strokes cover, or that the lasso encloses: (h, w) bool, at a smaller size.
         encloses: Whether it is a lasso.
 
     Returns:
@@ -50,7 +50,11 @@ def proposed(picture: np.ndarray, drawn: np.ndarray, *, encloses: bool) -> Curve
 
 
 def _along(drawn: np.ndarray) -> np.ndarray:
-    """Return GrabCut's labels (h, w) uint8 for a subject under a stroke."""
+    """Return GrabCut's labels (h, w) uint8 for a subject under a stroke: what belongs to it for sure, probably, or not.
+
+    Args:
+        drawn: The pixels that the stroke covers, (h, w) bool.
+    """
     away = cv2.distanceTransform((~drawn).astype(np.uint8), cv2.DIST_L2, 3)
     reach = max(REACH * _extent(drawn), NEAR * len(drawn))
     labels = np.full(drawn.shape, cv2.GC_BGD, np.uint8)
@@ -61,7 +65,11 @@ def _along(drawn: np.ndarray) -> np.ndarray:
 
 
 def _enclosed(drawn: np.ndarray) -> np.ndarray:
-    """Return GrabCut's labels (h, w) uint8 for a subject inside a lasso."""
+    """Return GrabCut's labels (h, w) uint8 for a subject inside a lasso, as `_along` does.
+
+    Args:
+        drawn: The pixels that the lasso encloses, (h, w) bool.
+    """
     margin = max(3, round(MARGIN * _extent(drawn)))
     around = cv2.dilate(drawn.astype(np.uint8), np.ones((2 * margin + 1,) * 2, np.uint8)) > 0
     deep = cv2.distanceTransform(drawn.astype(np.uint8), cv2.DIST_L2, 3)
@@ -73,7 +81,7 @@ def _enclosed(drawn: np.ndarray) -> np.ndarray:
 
 
 def _extent(drawn: np.ndarray) -> int:
-    """Return the larger side of the box around what is drawn, in pixels."""
+    """Return the longer side of the box around drawn pixels (h, w) bool, in pixels."""
     return max(int(np.ptp(np.flatnonzero(drawn.any(axis=axis)))) + 1 for axis in (0, 1))
 
 

@@ -1,4 +1,4 @@
-"""Decodes a source's frames ahead of time on a thread."""
+"""A source that decodes frames ahead of time, on a thread, in the order in which they will be read."""
 
 import threading
 from collections.abc import Iterable
@@ -14,13 +14,18 @@ _PATIENCE = 0.1  # seconds between two looks at whether a frame is still wanted
 
 
 class PrefetchSource(SourceWrapper):
-    """A source that decodes wanted frames ahead on one thread. Its frames are read-only.
+    """A source around another one, which decodes that one's frames ahead on a thread. Its frames are read-only.
 
-    It keeps the frames of the last `want` in memory until the next one.
+    Which frames, `want` tells. Decoded ones stay in memory until the next `want` without them.
     """
 
     def __init__(self, source: FrameSource, *, planes: bool = False) -> None:
-        """Decode a source ahead. planes: with `decoded`, so that `read` has to convert frames."""
+        """Decode a source ahead.
+
+        Args:
+            source: The source.
+            planes: Whether to decode by its `decoded`, so that frames may be planes, which `read` then has to convert.
+        """
         super().__init__(source)
         self._fetch = source.decoded if planes else source.read
         self._wanted: list[int] = []  # in the order of decoding
@@ -31,7 +36,7 @@ class PrefetchSource(SourceWrapper):
         self._thread: threading.Thread | None = None
 
     def want(self, indices: Iterable[int]) -> None:
-        """Decode these frames, in this order, and free all others."""
+        """Announce which frames will be read next: they are decoded in this order. All others are freed."""
         with self._changed:
             self._wanted = list(dict.fromkeys(indices))
             self._due = self._due if self._wanted else None
@@ -39,21 +44,22 @@ class PrefetchSource(SourceWrapper):
             self._wake()
 
     def read(self, index: int) -> np.ndarray:
-        """Return the source's frame, read-only. If it is not decoded yet, it comes before all wanted frames.
+        """Return the source's frame (height, width, 4), read-only.
 
-        Errors of the source are raised once; the next call decodes the frame again.
+        A frame that is not decoded yet is decoded before all announced ones. Errors of the source are raised once; the
+        next call decodes the frame again.
 
         Raises:
-            MediaError: the source cannot read it, or `close` was called meanwhile
-            core.stopping.StoppedError: the frame is no longer wanted; or it is not decoded yet, and this step may not
-                wait (stopping.waits)
+            MediaError: The source cannot read it, or `close` was called meanwhile.
+            core.stopping.StoppedError: The frame is no longer wanted; or it is not decoded yet, and this step may not
+                wait (stopping.waits).
         """
         picture = as_rgba(self.decoded(index))
         picture.flags.writeable = False
         return picture
 
     def decoded(self, index: int) -> Decoded:
-        """Return the frame like `read`, without conversion."""
+        """Return the source's frame as the thread decoded it, which may be planes. Errors as for `read`."""
         stopping.check()
         with self._changed:
             self._due = None if stopping.waits() or index in self._done else index
@@ -80,7 +86,7 @@ class PrefetchSource(SourceWrapper):
         return frame
 
     def close(self) -> None:
-        """End the thread, close the file and free all frames. A later read starts again."""
+        """End the thread, close the source and free all frames. A later read starts again."""
         with self._changed:
             thread, self._thread = self._thread, None
             self._wanted, self._due, self._done = [], None, {}
@@ -90,21 +96,26 @@ class PrefetchSource(SourceWrapper):
         self._source.close()
 
     def _wake(self) -> None:
+        """Start the thread, or tell it that something has changed."""
         if self._thread is None:
             self._thread = threads.daemon(self._decode)
         self._changed.notify_all()
 
     def _drop(self) -> None:
+        """Free decoded frames that nobody needs."""
         self._done = {index: frame for index, frame in self._done.items() if not self._is_unwanted(index)}
 
     def _is_unwanted(self, index: int) -> bool:
+        """Return whether a frame is neither announced nor waited for."""
         return index != self._due and index not in self._asked and index not in self._wanted
 
     def _next(self) -> int | None:
+        """Return the frame to decode next, or None. Those that reads wait for come first."""
         due = () if self._due is None else (self._due,)
         return next((index for index in (*self._asked, *due, *self._wanted) if index not in self._done), None)
 
     def _decode(self) -> None:
+        """Decode frames until the source is closed. This runs on the thread."""
         mine = threading.current_thread()
         while True:
             with self._changed:

@@ -15,7 +15,14 @@ STRETCHED = 0.1  # how much a proxy's aspect may differ, since the sides of Blen
 
 
 def smaller(source: FrameSource, divisor: int) -> FrameSource:
-    """Return a source reduced by a factor to each side. The last pixels may stand for fewer."""
+    """Return a source whose frames are reduced by a factor to each side, by averaging squares of pixels.
+
+    Its last row and column may stand for fewer pixels.
+
+    Args:
+        source: The footage.
+        divisor: The factor.
+    """
     if divisor == 1:
         return source
     made = SourceWrapper(source, lambda index: reduced(source.read(index), divisor, source.alpha))
@@ -24,15 +31,19 @@ def smaller(source: FrameSource, divisor: int) -> FrameSource:
 
 
 def reduced_size(length: int, divisor: int) -> int:
-    """Return a reduced length in pixels."""
+    """Return a length in pixels after it was reduced by a factor, rounded up."""
     return -(-length // divisor)
 
 
 def reduced(frame: np.ndarray, divisor: int, alpha: str) -> np.ndarray:
-    """Return the means over squares of a frame (height, width, 4) in its type. The last pixels are repeated at the
-    edges.
+    """Return a frame (height, width, 4) reduced by averaging squares of pixels, in its own dtype.
 
-    Straight colors are weighted with alpha.
+    Where a square goes beyond the edge, the last pixels are repeated.
+
+    Args:
+        frame: The frame.
+        divisor: The squares' side.
+        alpha: As in FrameSource; straight colors are weighted with their alpha.
     """
     if divisor == 1:
         return frame
@@ -51,20 +62,30 @@ def reduced(frame: np.ndarray, divisor: int, alpha: str) -> np.ndarray:
 
 
 class ProxySource(SourceWrapper):
-    """A source that reads frames from a proxy and converts them to its size and samples.
+    """A source whose frames come from a proxy of Blender's sequencer, converted to the size and samples of the footage.
 
-    Frames that are missing or damaged in the proxy come from the source.
+    Frames that are missing or damaged in the proxy come from the footage itself.
     """
 
     from_proxy = True
 
     def __init__(self, source: FrameSource, proxy: FrameSource) -> None:
+        """Read a proxy in place of a source.
+
+        Args:
+            source: The footage.
+            proxy: The proxy, which fits (see `fits`).
+        """
         super().__init__(source)
         self._proxy = proxy
         source.close()  # a read opens it again
 
     def read(self, index: int) -> np.ndarray:
-        """Return the frame (height, width, 4) in new memory."""
+        """Return the frame (height, width, 4) of the proxy, or of the footage if the proxy lacks it.
+
+        Raises:
+            MediaError: The footage cannot be read, either.
+        """
         try:
             frame = self._proxy.read(index)
         except MediaError:
@@ -80,7 +101,7 @@ class ProxySource(SourceWrapper):
 
     @cached_property
     def _samples(self) -> np.ndarray:
-        """The source's sample for each sample of the proxy: bytes, or half floats by their bits."""
+        """A table that converts samples of the proxy (bytes, or half floats by their bits) to those of the footage."""
         is_byte = self._proxy.dtype == np.uint8
         levels = np.arange(256) / 255 if is_byte else np.arange(1 << 16, dtype=np.uint16).view(np.float16).astype(float)
         with np.errstate(invalid="ignore", over="ignore"):  # some half floats are NaN
@@ -96,9 +117,13 @@ class ProxySource(SourceWrapper):
 
 
 def fits(proxy: FrameSource, source: FrameSource) -> bool:
-    """Return whether a proxy can replace a source: same length, not turned, both opaque, in bytes or half floats.
+    """Return whether a proxy can replace footage: same length, not turned, both opaque, in bytes or half floats.
 
-    Blender's proxies of float images are EXR files named .jpg, with sRGB values. Another size needs OpenCV.
+    Blender's proxies of float images are EXR files named .jpg, with sRGB values. A proxy of another size needs OpenCV.
+
+    Args:
+        proxy: The opened proxy.
+        source: The footage.
     """
     stretched = proxy.width * source.height / (proxy.height * source.width)
     return (

@@ -1,5 +1,7 @@
-"""Checks of written files: whether they are complete, since Blender does not always report a full disk; and which edit
-a rendered picture belongs to."""
+"""Check files that were written: whether they are complete, and which edit a rendered picture belongs to.
+
+Blender does not always report a full disk.
+"""
 
 import struct
 import zlib
@@ -19,13 +21,13 @@ _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
 
 class RenderedPicture(NamedTuple):
-    """A rendered picture.
+    """The properties of a rendered picture.
 
     Attributes:
-        size: (width, height)
-        channels: their number
-        samples: their type, such as "uint16"
-        edit: the key of the edit's version (core.farm.job_file), or None
+        size: (width, height).
+        channels: Their number.
+        samples: Their type, such as "uint16".
+        edit: The key of the edit's version that marks the picture (core.farm.job_file), or None.
     """
 
     size: tuple[int, int]
@@ -35,14 +37,14 @@ class RenderedPicture(NamedTuple):
 
 
 def read(path: Path, edit: str | None = None) -> RenderedPicture | None:
-    """Return the facts of a PNG or EXR file, or None if it is missing or damaged.
+    """Return the properties of a PNG or EXR file, or None if it is missing or damaged.
 
     A PNG's checksums are compared. An EXR is decoded: ZIP and ZIPS have checksums. With other codecs, only missing data
     and errors of decoding are found.
 
     Args:
-        path: the file
-        edit: the key of an edit's version. Pictures of others give None, and are not decoded.
+        path: The file.
+        edit: The key of an edit's version (core.farm.job_file). Pictures of other edits give None, and are not decoded.
     """
     image = ImageInput.open(check_name(path)) if path.is_file() else None
     if image is None:
@@ -61,7 +63,10 @@ def read(path: Path, edit: str | None = None) -> RenderedPicture | None:
 
 
 def is_transparent(path: Path) -> bool:
-    """Return whether any pixel is not opaque. The last channel is alpha. False if the picture cannot be read."""
+    """Return whether a picture file has a pixel that is not opaque. Its last channel is taken for alpha.
+
+    If it cannot be read, return False.
+    """
     image = ImageInput.open(check_name(path))
     last = image.spec().nchannels - 1 if image else 0
     alpha = image.read_image(0, 0, last, last + 1, "float") if image else None
@@ -97,14 +102,17 @@ def is_whole_picture(path: Path) -> bool:
 
 
 def is_whole_movie(path: Path, count: int) -> bool:
-    """Return whether a movie has `count` pictures, without decoding. Without PyAV: whether the file is not empty."""
+    """Return whether a movie file has at least `count` pictures, without decoding them.
+
+    Without PyAV, return whether the file is not empty.
+    """
     if pyav_missing():
         return path.is_file() and path.stat().st_size > 0
     return whole_pictures(path) >= count
 
 
 def whole_pictures(path: Path) -> int:
-    """Return the number of a movie's pictures, without decoding. 0: it cannot be read, or PyAV is missing."""
+    """Return how many pictures a movie file has, without decoding them. 0: it cannot be read, or PyAV is missing."""
     if pyav_missing():
         return 0
     import av
@@ -117,7 +125,7 @@ def whole_pictures(path: Path) -> int:
 
 
 def is_whole_blend(path: Path) -> bool:
-    """Return whether a .blend file is complete, judged by its last block or by the table after compressed blocks."""
+    """Return whether a .blend file is complete, by its last block or, if compressed, by the table at its end."""
     with path.open("rb") as file:
         file.seek(max(0, path.stat().st_size - _BLEND_END))
         end = file.read()
@@ -125,7 +133,7 @@ def is_whole_blend(path: Path) -> bool:
 
 
 def why_short(folder: Path) -> str:
-    """Return why files in a folder may be cut off: the error of writing another file there."""
+    """Return why files in a folder may be cut off, such as a full disk: the error of writing another file there."""
     probe = folder / "probe"
     try:
         probe.write_bytes(bytes(1 << 20))

@@ -1,4 +1,4 @@
-"""Image sequences and single images: the samples of their files."""
+"""Image sequences and single images: finding their files, and reading the samples in them."""
 
 import itertools
 import re
@@ -37,7 +37,7 @@ Layer = tuple[ImageSpec, list[int]]  # the spec of a part of an image, and posit
 
 
 class SequenceSource(FrameSource):
-    """Images as frames, or one of their channels.
+    """An image sequence or image as a source: all colors of its files, or one channel of them.
 
     With `files` (an image strip's list), frame i is files[i]. Else files are found beside the first one, and frame i is
     the file whose number is i higher. If a number is missing, the file before it is repeated. If more than MISSING are
@@ -66,13 +66,13 @@ class SequenceSource(FrameSource):
         """Find the files, and read the first one's header.
 
         Args:
-            path: the first file
-            files: as above
-            alpha: as for opening.open_source
-            channel: one of CHANNELS, or a name in the files; None: all colors
+            path: The first file.
+            files: An image strip's list of file names. None: files are found beside `path`.
+            alpha: As for opening.open_source.
+            channel: A key of CHANNELS, or a channel's name in the files. None: all colors.
 
         Raises:
-            MediaError: the first file cannot be read or has no such channel, or its folder cannot be listed
+            MediaError: The first file cannot be read or has no such channel, or its folder cannot be listed.
         """
         path = Path(path)
         if files is None:
@@ -103,11 +103,11 @@ class SequenceSource(FrameSource):
         self.options = {}
 
     def read(self, index: int) -> np.ndarray:
-        """Return the frame, or the channel's samples.
+        """Return a frame as RGBA (height, width, 4), or the samples (height, width, n) of the channel.
 
         Raises:
-            MediaError: the file is missing, damaged or unlike the first
-            IndexError: there is no such frame
+            MediaError: The file is missing, damaged or unlike the first.
+            IndexError: There is no such frame.
         """
         check_index(self, index)
         path = check_file(self.files[index])
@@ -126,20 +126,20 @@ class SequenceSource(FrameSource):
             return samples if self._channel else expanded(samples)
 
     def _window(self, image: ImageInput, spec: ImageSpec, path: Path) -> Window:
-        """Return the window of an image that is shown."""
+        """Return the window of an opened image that is the picture: its data window or its display window."""
         if not self._channel or image.format_name() != "openexr" or spec.roi.contains(spec.roi_full):
             return spec.x, spec.y, spec.width, spec.height
         check_size(path.name, spec.full_width, spec.full_height)
         return spec.full_x, spec.full_y, spec.full_width, spec.full_height
 
     def _usual_alpha(self) -> str:
-        """Return what Blender assumes. It ignores what a TIFF tells."""
+        """Return the alpha mode that Blender assumes for such files. It ignores what a TIFF's header tells."""
         deep_tiff = self.path.suffix.lower() in (".tif", ".tiff") and self.dtype == np.uint16
         return "premultiplied" if self.transfer == "linear" or deep_tiff else "straight"
 
 
 def expanded(samples: np.ndarray) -> np.ndarray:
-    """Return Y, YA, RGB or RGBA samples (height, width, n) as RGBA in new memory."""
+    """Return samples (height, width, n) of grey, grey with alpha, RGB or RGBA as RGBA, in new memory."""
     height, width, channels = samples.shape
     picture = np.empty((height, width, 4), samples.dtype)
     picture[..., :3] = samples[..., : 1 if channels < 3 else 3]
@@ -149,7 +149,13 @@ def expanded(samples: np.ndarray) -> np.ndarray:
 
 
 def _in_window(samples: np.ndarray, spec: ImageSpec, window: Window) -> np.ndarray:
-    """Return an image's samples in a window (x, y, width, height), 0 outside the image."""
+    """Return an image's samples (height, width, n) in a window, 0 outside the image.
+
+    Args:
+        samples: Those of the image's data window.
+        spec: The image's header.
+        window: x, y, width and height in the image's coordinates.
+    """
     x, y, width, height = window
     if window == (spec.x, spec.y, spec.width, spec.height):
         return samples
@@ -161,14 +167,19 @@ def _in_window(samples: np.ndarray, spec: ImageSpec, window: Window) -> np.ndarr
 
 
 def sequence_files(path: Path) -> list[Path]:
-    """Return the files of the sequence that starts with a file; raise MediaError if there is none."""
+    """Return the files of the sequence that starts with a file. Missing numbers are left out.
+
+    Raises:
+        MediaError: The file is missing, or its folder cannot be listed.
+    """
     return [*_numbered(check_file(path))[0].values()]
 
 
 def _numbered(path: Path) -> tuple[dict[int, Path], Path | None]:
-    """Return the files that differ only in the frame number, by frame, and the first one after too wide a gap, or None.
+    """Return the files of the sequence that starts with a file.
 
-    The given file is frame 0.
+    Returns:
+        The files by frame, from 0, without missing ones; and the first file after a gap that is too wide, or None.
     """
     parts, alike = _frame_number(path)
     if parts is None:
@@ -188,19 +199,22 @@ def _numbered(path: Path) -> tuple[dict[int, Path], Path | None]:
 
 
 def numbered_alike(path: Path) -> list[Path]:
-    """Return the sorted files of a folder whose names differ at most in the frame number.
+    """Return the sorted files of a folder whose names differ from a file's at most in the frame number.
 
     Raises:
-        MediaError: the folder cannot be listed
+        MediaError: The folder cannot be listed.
     """
     return _frame_number(path)[1]
 
 
 def _frame_number(path: Path) -> tuple[_Parts | None, list[Path]]:
-    """Return where a file's name has its frame number, and the files in its folder that differ only there.
+    """Find the frame number in a file's name.
 
-    It is the last number that varies between them; a version (v3) counts only if no other varies. If none varies, it is
-    the last number.
+    It is the last number that varies among the files of the folder; a version (v3) counts only if no other varies. If
+    none varies, it is the last number.
+
+    Returns:
+        The name's parts around the number, or None without any; and the files of the folder that differ only there.
     """
     numbers = _numbers(path.stem)
     if not numbers:
@@ -219,18 +233,18 @@ def _frame_number(path: Path) -> tuple[_Parts | None, list[Path]]:
 
 
 def _numbers(stem: str) -> list[_Parts]:
-    """Return the numbers in a file's stem, the last one first."""
+    """Return the numbers in a file's stem, the last one first, each with what is before and after it."""
     found = [(stem[: n.start()], n[0], stem[n.end() :]) for n in re.finditer(r"[0-9]+", stem)]
     return found[::-1]
 
 
 def by_number(path: Path, *, listed: bool = False) -> Callable[[int], Path] | None:
-    """Return a function of i: the file whose number is i higher. None: the stem has no number.
+    """Return a function of i that gives the file whose number is i higher than a file's, or None without a number.
 
     Args:
-        path: the first file
-        listed: the folder's files decide which number counts (MediaError: it cannot be listed); else it is the last
-            one, as in Blender's movie clips
+        path: The file.
+        listed: Whether the other files of the folder decide which number is that of the frame (MediaError: it cannot be
+            listed). Otherwise it is the last one, as in Blender's movie clips.
     """
     parts = _frame_number(path)[0] if listed else next(iter(_numbers(path.stem)), None)
     if parts is None:
@@ -240,7 +254,7 @@ def by_number(path: Path, *, listed: bool = False) -> Callable[[int], Path] | No
 
 
 def _has_alpha(path: Path) -> bool:
-    """Return whether a readable file has alpha. It is opened only if it has changed."""
+    """Return whether an image file has alpha; False if it cannot be read. It is opened only if it has changed."""
     if path.suffix.lower() in WITHOUT_ALPHA:
         return False
     try:
@@ -251,12 +265,13 @@ def _has_alpha(path: Path) -> bool:
 
 @lru_cache(maxsize=1 << 17)  # a sequence of an hour and a half
 def _had_alpha(path: Path, _stamp: tuple[int, int] | None) -> bool:
+    """Return whether an image file has alpha. The result is cached for its stamp."""
     with _opened(path) as (_image, _spec, layer):
         return len(layer) in ALPHA
 
 
 def _parts(image: ImageInput) -> Iterator[ImageSpec]:
-    """Yield the spec of each part of an image, and select the part for reading."""
+    """Yield the header of each part of an image, which is then the part that is read."""
     for part in itertools.count():
         if not image.seek_subimage(part, 0):
             return
@@ -264,7 +279,11 @@ def _parts(image: ImageInput) -> Iterator[ImageSpec]:
 
 
 def _first_colours(image: ImageInput, path: Path) -> Layer:
-    """Return the channels that Blender shows."""
+    """Return the channels of an image that Blender shows: their part and positions.
+
+    Raises:
+        MediaError: It has no colors.
+    """
     spec = whole = image.spec()
     if image.format_name() != "openexr":
         return spec, [*range(min(spec.nchannels, 4))]
@@ -280,9 +299,13 @@ def _first_colours(image: ImageInput, path: Path) -> Layer:
 
 
 def _channel_named(channel: str, image: ImageInput, path: Path) -> Layer:
-    """Return a channel: three positions for the luminance of colors, none for the alpha of an opaque image.
+    """Return the channels of an image that make one channel: their part and positions.
 
-    A channel of an EXR that is named "red" comes first: coefficients have the names of shutters.
+    There are three for the luminance of colors, and none for the alpha of an opaque image. A channel of an EXR that is
+    itself named "red" comes before its red: files of coefficients have the names of shutters.
+
+    Raises:
+        MediaError: The image has no such channel.
     """
     names: list[str] = []
     is_exr = image.format_name() == "openexr"
@@ -300,7 +323,7 @@ def _channel_named(channel: str, image: ImageInput, path: Path) -> Layer:
 
 
 def _colour_channels(names: Iterable[str]) -> list[int]:
-    """Return the positions of the colors that Blender shows of an EXR.
+    """Return the positions of the channels that Blender shows of an EXR, by the names of all its channels.
 
     They belong to the first layer, and there to no pass or "Combined" before other passes. Without RGB, it is XYZ, then
     grey.
@@ -319,6 +342,7 @@ def _colour_channels(names: Iterable[str]) -> list[int]:
 
 
 def _rank(place: str) -> tuple[str, bool, str]:
+    """Return a key that sorts the layers and passes of an EXR, given as layer.pass, in Blender's order."""
     layer, _, name = place.rpartition(".")
     return layer, name not in ("", "Combined"), name
 
@@ -327,9 +351,18 @@ def _rank(place: str) -> tuple[str, bool, str]:
 def _opened(
     path: Path, layer_of: Callable[[ImageInput, Path], Layer] = _first_colours
 ) -> Iterator[tuple[ImageInput, ImageSpec, list[int]]]:
-    """Open an image with a layer of `layer_of`; raise MediaError if it cannot be read.
+    """Open an image, and close it at the end of the context.
 
-    The layer's channels are Y, YA, RGB or RGBA, or those of a channel.
+    Args:
+        path: The file.
+        layer_of: Chooses the channels that are wanted, and their part of the image.
+
+    Yields:
+        The open image, the header of the part, and the positions of the channels: those of Y, YA, RGB or RGBA, or of a
+        single channel.
+
+    Raises:
+        MediaError: It cannot be read.
     """
     wishes = ImageSpec()
     wishes.attribute("oiio:UnassociatedAlpha", 1)  # no premultiplication on reading
@@ -348,11 +381,22 @@ def _opened(
 
 
 def _dtype(spec: ImageSpec) -> np.dtype:
+    """Return the dtype in which the samples of an image with this header are read."""
     return np.dtype(SAMPLES.get(str(spec.format), np.float32))
 
 
 def _samples(image: ImageInput, spec: ImageSpec, layer: list[int], path: Path) -> np.ndarray:
-    """Return the layer's samples (height, width, channels)."""
+    """Return the samples (height, width, channels) of an opened image at these positions.
+
+    Args:
+        image: The image, at the wanted part.
+        spec: The part's header.
+        layer: The channels' positions.
+        path: The file, for errors.
+
+    Raises:
+        MediaError: They cannot be decoded.
+    """
     kind = str(spec.format) if str(spec.format) in SAMPLES else "float"
     first, stop = min(layer), max(layer) + 1
     if image.format_name() != "openexr":  # channels are interleaved: reading some takes longer than reading all
@@ -367,10 +411,10 @@ def _samples(image: ImageInput, spec: ImageSpec, layer: list[int], path: Path) -
 
 
 def _told(text: str, path: Path, otherwise: str) -> str:
-    """Return OpenImageIO's message of an error in a file, for use inside a sentence."""
+    """Return OpenImageIO's message of an error in a file, for use inside a sentence, or `otherwise` without one."""
     return " ".join(text.replace(str(path), path.name).split()).partition(". ")[0] or otherwise
 
 
 def no_channel(path: Path, channel: str, names: Iterable[str]) -> MediaError:
-    """Return the error for a file without a channel, which names others."""
+    """Return the error for a file that lacks a channel. It tells the names that there are."""
     return MediaError(f"{path.name}: has no channel {channel}, but {', '.join(names)}")

@@ -1,1 +1,1 @@
-"""Devices that run compute passes: OpenGL through moderngl, its memory, and how passes are declared. No bpy."""
+"""GPUs that run compute shaders: OpenGL through moderngl, GPU memory, and how passes are declared. No bpy."""

@@ -1,8 +1,8 @@
-"""The interface of a GPU: texture arrays within a memory budget, and compute passes.
+"""The interface of a GPU that runs compute shaders: texture arrays within a memory budget, and compute passes.
 
 When the budget is full, textures that no pass uses make room. Computed textures move to the host and come back, bit for
 bit, when a pass binds them, so a picture does not depend on the free memory. If that is not enough, the windows of
-other pictures are freed and read again later.
+other pictures (their frames of footage) are freed and read again later.
 """
 
 from __future__ import annotations
@@ -33,21 +33,21 @@ Own: TypeAlias = Any  # a texture of the device's library
 
 
 def texel_bytes(kind: str) -> int:
-    """Return the bytes of a texel of a GLSL format, such as rgba32f."""
+    """Return the bytes of a texel in a GLSL image format: 16 for rgba32f."""
     components, bits = re.findall(r"[a-z]+|\d+", kind)[:2]
     return len(components) * int(bits) // 8
 
 
 class NoDeviceError(RuntimeError):
-    """The device cannot be used or has no room. The message is a sentence for the user."""
+    """The GPU cannot be used, or has no room. The message is a sentence for the user."""
 
 
 class Budget:
-    """The memory that textures may take on a GPU, shared by all devices on it. Usable on any thread.
+    """The memory that textures may take on a GPU, shared by all devices on it. For any thread.
 
     Attributes:
-        limit: the most bytes
-        used: bytes that are taken
+        limit: The most bytes that textures may take.
+        used: The bytes that they take.
     """
 
     def __init__(self, limit: int) -> None:
@@ -55,24 +55,25 @@ class Budget:
         self._lock = Lock()
 
     def take(self, size: int) -> bool:
-        """Take bytes if they are free. Return whether they were."""
+        """Take `size` bytes if they are free, and return whether they were."""
         with self._lock:
             fits = self.used + size <= self.limit
             self.used += size if fits else 0
             return fits
 
     def give_back(self, size: int) -> None:
+        """Make `size` bytes free that were taken."""
         with self._lock:
             self.used -= size
 
 
 def allowed(memory: int | None) -> int:
-    """Return the bytes that textures may take on a GPU.
+    """Return how many bytes textures may take on a GPU.
 
     It must be the same at each start, so that all parts of a film have the same bits.
 
     Args:
-        memory: the GPU's bytes. None: unknown.
+        memory: The GPU's bytes. None: unknown.
     """
     # Blender, the screen and the driver need the rest of the GPU's memory.
     limits = [UNKNOWN if memory is None else int(memory * 0.75)]
@@ -82,7 +83,7 @@ def allowed(memory: int | None) -> int:
 
 
 def machine_memory() -> int | None:
-    """Return the bytes of the machine's memory, or None if they are unknown."""
+    """Return the bytes of the machine's main memory, or None if they are unknown."""
     if sys.platform == "win32":
         kilobytes = ctypes.c_ulonglong()
         known = ctypes.windll.kernel32.GetPhysicallyInstalledSystemMemory(ctypes.byref(kilobytes))
@@ -94,15 +95,15 @@ def machine_memory() -> int | None:
 
 
 class Texture:
-    """A texture array on a device.
+    """A texture array on a device. Its content can move to the host's memory and back.
 
     Attributes:
-        device: the device. None: a small texture that the budget does not count.
-        size: (width, height, layers) in texels
-        kind: the format, as for Device.texture
-        bytes: its size on the device
-        own: the texture of the graphics library. None: it was released, or its content is on the host.
-        waiting: its content while that is on the host, to free the GPU's memory: (layers, height, width, components)
+        device: The device. None: a small texture that the budget does not count.
+        size: (width, height, layers) in texels.
+        kind: The GLSL format, as for Device.texture.
+        bytes: Its size on the device.
+        own: The texture object of the graphics library. None: it was released, or its content is on the host.
+        waiting: Its content while that is on the host, (layers, height, width, components), else None.
     """
 
     def __init__(self, device: Device | None, size: tuple[int, int, int], kind: str, own: Own = None) -> None:
@@ -113,13 +114,13 @@ class Texture:
 
     @property
     def gpu(self) -> Own:
-        """`own`, brought to the device if it is on the host."""
+        """The texture object of the graphics library. Its content comes back to the device if it is on the host."""
         if self.device is not None:
             self.device.bring((self,))
         return self.own
 
     def release(self) -> None:
-        """Free the memory. Call it inside `Device.current` or `Device.freeing`."""
+        """Free the texture's memory. Call it inside `Device.current` or `Device.freeing`."""
         if self.device is not None:
             self.device.drop(self)
         self.waiting = None
@@ -131,12 +132,12 @@ class Device:
     Call its methods inside `with device.current():`, on one thread at a time, and with textures that it made.
 
     Attributes:
-        name: the renderer's name
-        max_size: the most texels along a texture's side
-        max_layers: the most layers of a texture array
-        budget: the memory of all textures on this GPU, shared with other devices on it
-        takes_planes: whether frames are fastest to send as planes (core.frames.frame_source), in r32ui textures
-        ask_others: called when the budget is full; makes other devices free memory. None: there are none.
+        name: The renderer's name, as the driver tells it.
+        max_size: The most texels along a texture's side.
+        max_layers: The most layers of a texture array.
+        budget: The memory of all textures on this GPU, shared with other devices on it.
+        takes_planes: Whether frames are fastest to send as planes (core.frames.frame_source), in r32ui textures.
+        ask_others: Called when the budget is full; makes other devices free memory. None: there are none.
     """
 
     name: str
@@ -153,7 +154,7 @@ class Device:
         """Make the device usable on this thread until the `with` block ends.
 
         Raises:
-            NoDeviceError: the device cannot be used now
+            NoDeviceError: It cannot be used now.
         """
         raise NotImplementedError
 
@@ -165,14 +166,14 @@ class Device:
         """Return a new texture array of undefined content.
 
         Args:
-            width: in texels
-            height: in texels
-            layers: their number
-            kind: a GLSL format: rgba8, rgba16, rgba16f, rgba16ui, rgba32ui, rgba32f, r32f or r32ui. Passes read rgba8
+            width: In texels.
+            height: In texels.
+            layers: Their number.
+            kind: A GLSL format: rgba8, rgba16, rgba16f, rgba16ui, rgba32ui, rgba32f, r32f or r32ui. Passes read rgba8
                 and rgba16 as 0 … 1, and nothing with filtering.
 
         Raises:
-            NoDeviceError: the device has no room for it
+            NoDeviceError: The device has no room for it.
         """
         texture = Texture(self, (width, height, layers), kind)
         texture.own = self._made(texture, ())
@@ -180,34 +181,37 @@ class Device:
         return texture
 
     def write(self, texture: Texture, array: np.ndarray, layer: int = 0, *, opaque: bool = False) -> None:
-        """Fill a layer, or its first rows.
+        """Fill a layer of a texture, or its first rows.
 
         Args:
-            texture: the texture
-            array: (rows, width[, components]), C-contiguous, in the format's type
-            layer: the layer's number
-            opaque: every alpha is full, so the device may send only the colors
+            texture: The texture.
+            array: (rows, width[, components]), C-contiguous, in the format's type.
+            layer: The layer's number.
+            opaque: Whether every alpha is full, so that the device may send only the colors.
 
         Raises:
-            KeyError: only passes write and read this format (rgba16ui and rgba32ui on Blender's GPU)
+            KeyError: Only passes write and read this format (rgba16ui and rgba32ui on Blender's GPU).
         """
         raise NotImplementedError
 
     def send(self, texture: Texture, frame: np.ndarray) -> Texture:
-        """Send an opaque 8-bit frame (rows, width, 4) for the next pass.
+        """Send an opaque 8-bit frame to the device, for the next pass.
+
+        Args:
+            texture: An rgba8 texture of the frame's size, which may be used.
+            frame: (rows, width, 4) uint8.
 
         Returns:
-            The texture for that pass: `texture` (rgba8, of the frame's size), or an r32f one with the numbers
-            R + 256 G + 65536 B.
+            The texture for that pass: `texture`, or one of r32f with the numbers R + 256 G + 65536 B.
         """
         self.write(texture, frame, opaque=True)
         return texture
 
     def read(self, texture: Texture) -> np.ndarray:
-        """Return a copy (layers, height, width, components) in the format's type, after all passes so far.
+        """Return a copy (layers, height, width, components) of a texture in its format's type, after all passes so far.
 
         Raises:
-            KeyError: as for `write`
+            KeyError: As for `write`.
         """
         raise NotImplementedError
 
@@ -222,18 +226,18 @@ class Device:
         blocks: Mapping[str, np.ndarray] | None = None,
         **constants: Any,
     ) -> None:
-        """Run a pass. Later passes read what it stored.
+        """Run a compute pass. Later passes read what it stored.
 
         Args:
-            program: the pass
-            extent: the number of invocations (x, y[, z])
-            textures: {name: texture} for its samplers
-            images: {name: texture} for its images
-            blocks: {name: C-contiguous float32 array (length, 4)} for its blocks
-            constants: {name: number or tuple of numbers} for its constants
+            program: The pass.
+            extent: The number of invocations (x, y[, z]).
+            textures: {name: texture} for its samplers.
+            images: {name: texture} for its images.
+            blocks: {name: C-contiguous float32 array (length, 4)} for its uniform blocks.
+            constants: {name: number or tuple of numbers} for its uniforms.
 
         Raises:
-            core.stopping.StoppedError: the picture is no longer wanted
+            core.stopping.StoppedError: The picture is no longer wanted.
         """
         stopping.check()
         sampled = {name: (textures or {})[name] for name in program.samplers}
@@ -243,23 +247,28 @@ class Device:
         self._dispatch(program, program.groups(extent), *own, blocks or {}, constants)
 
     def use(self, release: Callable[[], None]) -> None:
-        """Note that the window that `release` frees is in use. If memory is short, other windows are freed first."""
+        """Note that a window is in use. If memory is short, those whose use is longest ago are freed first.
+
+        Args:
+            release: Frees the window.
+        """
         self.forget(release)
         self._windows[release] = None
 
     def forget(self, release: Callable[[], None]) -> None:
-        """Note that a window was freed."""
+        """Note that the window that `release` frees was freed."""
         self._windows.pop(release, None)
 
     def release(self) -> None:
-        """Free the device at any time. Textures have a `release` of their own."""
+        """Free the device, at any time. Its textures have to be released by themselves."""
         raise NotImplementedError
 
     def bring(self, textures: Iterable[Texture]) -> None:
-        """Bring all these textures to the device.
+        """Bring the content of these textures to the device, where it is on the host.
 
         Raises:
-            NoDeviceError: it has no room for all of them at once
+            NoDeviceError: The device has no room for all of them at once.
+            ValueError: A texture was released.
         """
         wanted = tuple(texture for texture in textures if texture.device is self)
         for texture in wanted:
@@ -282,6 +291,15 @@ class Device:
             self.budget.give_back(texture.bytes)
 
     def _made(self, texture: Texture, beside: tuple[Texture, ...]) -> Own:
+        """Return a new texture of the graphics library for a texture, and make room for it if necessary.
+
+        Args:
+            texture: The texture.
+            beside: Textures that must stay on the device.
+
+        Raises:
+            NoDeviceError: There is no room.
+        """
         width, height, layers = texture.size
         possible = max(width, height) <= self.max_size and layers <= self.max_layers
         while possible and texture.bytes <= self.budget.limit:
@@ -297,7 +315,11 @@ class Device:
         )
 
     def _make_room(self, beside: tuple[Texture, ...]) -> bool:
-        """Free something that is not in use and not among `beside`. Return whether there was anything."""
+        """Free some memory: of other devices, of a texture that is not in `beside`, or of a window that is not in use.
+
+        Returns:
+            Whether there was anything to free.
+        """
         used = self.budget.used
         if self.ask_others is not None and used > sum(texture.bytes for texture in self._held):
             self.ask_others()
@@ -314,31 +336,48 @@ class Device:
         return False
 
     def _make(self, width: int, height: int, layers: int, kind: str) -> Own:
-        """Return a new texture of the library.
+        """Return a new texture object of the graphics library.
+
+        Args:
+            width, height, layers, kind: As for `texture`.
 
         Raises:
-            NoDeviceError: there is no room for it
+            NoDeviceError: There is no room for it.
         """
         raise NotImplementedError
 
     def _free(self, own: Own) -> None:
-        """Free a texture of `_make`."""
+        """Free a texture object of the graphics library."""
         raise NotImplementedError
 
     def _dispatch(self, program: Pass, groups: tuple[int, ...], textures: dict, images: dict, *given: Mapping) -> None:
-        """Run a pass in `groups` workgroups. textures, images: of `_make`, by name; given: blocks, then constants."""
+        """Run a pass with the graphics library.
+
+        Args:
+            program: The pass.
+            groups: The number of workgroups (x, y, z).
+            textures: {name: texture object} for its samplers.
+            images: {name: texture object} for its images.
+            given: Its uniform blocks and its constants, as for `run`.
+        """
         raise NotImplementedError
 
 
 class NamedTextures:
-    """Textures that are kept from picture to picture, by name. A texture is made again when its size changes."""
+    """Textures that are kept by name from picture to picture. A texture is made again when its size changes."""
 
     def __init__(self, device: Device) -> None:
         self.device = device
         self._kept: dict[str, Texture] = {}
 
     def of(self, name: str, size: tuple[int, int, int], kind: str = "rgba32f") -> Texture:
-        """Return the texture of a name, which always has the same kind. size: (width, height, layers)."""
+        """Return the texture of a name. It is new, with undefined content, if there is none of this size.
+
+        Args:
+            name: The name.
+            size: (width, height, layers).
+            kind: The GLSL format, always the same for a name.
+        """
         texture = self._kept.get(name)
         if texture is None or texture.size != size:
             if texture is not None:
@@ -347,7 +386,13 @@ class NamedTextures:
         return texture
 
     def filled(self, name: str, layers: Sequence[np.ndarray] | np.ndarray, kind: str = "rgba32f") -> Texture:
-        """Return the texture of a name, filled with layers (height, width[, components]) of the format's type."""
+        """Return the texture of a name, filled with arrays.
+
+        Args:
+            name: The name.
+            layers: An array (height, width[, components]) for each layer, in the format's type.
+            kind: The GLSL format, always the same for a name.
+        """
         height, width = layers[0].shape[:2]
         texture = self.of(name, (width, height, len(layers)), kind)
         for number, layer in enumerate(layers):
@@ -355,7 +400,7 @@ class NamedTextures:
         return texture
 
     def release(self) -> None:
-        """Free all textures. Call it inside Device.freeing."""
+        """Free all textures. Call it inside `Device.current` or `Device.freeing`."""
         for texture in self._kept.values():
             texture.release()
         self._kept.clear()

@@ -1,4 +1,4 @@
-"""The OpenGL device: a moderngl context without a window (EGL, WGL)."""
+"""A device on OpenGL: a moderngl context without a window (through EGL on Linux, WGL on Windows)."""
 
 import ctypes
 import sys
@@ -37,7 +37,7 @@ _FREE_MEMORY = 0x87FC
 
 @contextmanager
 def _kept_context() -> Iterator[None]:
-    """Restore the thread's current context at the end. On EGL, moderngl would leave the thread without one."""
+    """Make the thread's OpenGL context current again at the end. On EGL, moderngl leaves the thread without one."""
     if not _EGL:
         yield
         return
@@ -53,6 +53,7 @@ def _kept_context() -> Iterator[None]:
 
 @cache
 def _egl() -> ctypes.CDLL:
+    """Return the EGL library."""
     egl = ctypes.CDLL("libEGL.so.1")
     for name in ("Context", "Display", "Surface"):
         getattr(egl, f"eglGetCurrent{name}").restype = ctypes.c_void_p
@@ -62,10 +63,12 @@ def _egl() -> ctypes.CDLL:
 
 @cache
 def _gl(name: str) -> Callable[..., Any]:
-    """Return an OpenGL function without a result. ctypes releases Python's lock while it runs.
+    """Return an OpenGL function that has no result, for calls during which other Python threads can run.
+
+    ctypes releases Python's lock for a call, and moderngl does not.
 
     Raises:
-        NoDeviceError: there is no such function
+        NoDeviceError: There is no such function.
     """
     if sys.platform == "win32":
         return getattr(ctypes.windll.opengl32, name)  # this DLL has only those of OpenGL 1.1
@@ -77,7 +80,7 @@ def _gl(name: str) -> Callable[..., Any]:
 
 
 def _memory(context: moderngl.Context, renderer: str) -> int | None:
-    """Return the bytes of memory of the current context's GPU, or None if it does not tell.
+    """Return the bytes of memory of the current context's GPU, or None if the driver does not tell.
 
     If only the free memory is known, it is the power of two below that, to be the same at the next start.
     """
@@ -93,13 +96,17 @@ def _memory(context: moderngl.Context, renderer: str) -> int | None:
 
 
 class GLDevice(Device):
-    """A Device on a new OpenGL 4.3 context. budget: None: what is allowed of the GPU's memory.
+    """A device on a new OpenGL 4.3 context.
 
     Do not use it on a thread with a current GLX context, such as Blender's main thread on X11: EGL does not replace
     that context, which would get the calls.
 
+    Args:
+        budget: The memory that it shares with other devices on the GPU. None: one of its own (`allowed`).
+        ask_others: As for Device.
+
     Raises:
-        NoDeviceError: there is no OpenGL 4.3
+        NoDeviceError: There is no OpenGL 4.3.
     """
 
     takes_planes = True
@@ -125,7 +132,7 @@ class GLDevice(Device):
 
     @contextmanager
     def current(self) -> Iterator[Self]:
-        """See Device. The thread's previous context is current again afterwards."""
+        """Make the context current on this thread until the `with` block ends, and then the previous one again."""
         with _kept_context(), self._context:
             yield self
 
@@ -145,12 +152,12 @@ class GLDevice(Device):
         own.release()
 
     def write(self, texture: Texture, array: np.ndarray, layer: int = 0, *, opaque: bool = False) -> None:
-        """See Device. `opaque` has no effect here."""
+        """Fill a layer of a texture, or its first rows (Device.write). `opaque` has no effect here."""
         height, width = array.shape[:2]
         texture.gpu.write(array, viewport=(0, 0, layer, width, height, 1), alignment=1)
 
     def read(self, texture: Texture) -> np.ndarray:
-        """See Device."""
+        """Return a copy (layers, height, width, components) of a texture (Device.read)."""
         components, _, dtype = FORMATS[texture.kind]
         width, height, layers = texture.size
         array = np.empty((layers, height, width, components), dtype=dtype)
@@ -185,9 +192,9 @@ class GLDevice(Device):
         self._context.memory_barrier()
 
     def finish(self) -> None:
-        """Wait until all passes are done. On EGL, other Python threads run meanwhile."""
+        """Wait until all passes are done. On Linux, other Python threads run meanwhile."""
         _gl("glFinish")() if _EGL else self._context.finish()
 
     def release(self) -> None:
-        """See Device."""
+        """Free the context (Device.release)."""
         self._context.release()

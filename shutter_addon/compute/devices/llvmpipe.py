@@ -1,5 +1,8 @@
-"""Limits of Mesa's software renderer, llvmpipe. Two more things exist only for it: the pass compose_search, where
-another would take too many iterations, and TILED in shaders/include/sums.glsl, since it stores textures row by row."""
+"""Limits of llvmpipe, Mesa's software renderer.
+
+Two more things exist only for it: the pass compose_search, where another would take too many iterations, and TILED in
+shaders/include/sums.glsl, since it stores textures row by row.
+"""
 
 import numpy as np
 
@@ -10,19 +13,22 @@ MOST_BYTES = 1 << 30
 
 
 def is_llvmpipe(renderer: str) -> bool:
-    """Return whether a renderer's name is that of llvmpipe. Its memory is the machine's, with textures row by row."""
+    """Return whether a renderer's name, as the driver tells it, is that of llvmpipe.
+
+    It uses the machine's memory, and stores textures row by row.
+    """
     return "llvmpipe" in renderer
 
 
 def frames_iterations(values: np.ndarray, span: tuple[int, int]) -> int:
-    """Return an upper bound of the loop iterations of an invocation of compose_frames, for any coefficients.
+    """Return the most loop iterations that an invocation of the pass compose_frames can take, for any coefficients.
 
-    A piece counts for every frame from the one in which it may begin to the one in which it and all before it have
-    ended.
+    llvmpipe ends loops after 65,535 without an error. Each piece (a row of the table) counts for every frame from the
+    one in which it may begin to the one in which it and all before it have ended.
 
     Args:
-        values: the table of composition_passes.table
-        span: FrameState.open_span
+        values: The table of shutters (composition_passes.table).
+        span: FrameState.open_span.
     """
     groups = values.shape[1] // 2
     start, end, apart = values[1:, :groups], values[1:, groups:-1], values[1:, -1, 1]
@@ -33,12 +39,14 @@ def frames_iterations(values: np.ndarray, span: tuple[int, int]) -> int:
 
 
 def median_iterations(rows: int, frames: int, kind: str) -> int:
-    """Return the loop iterations of compose_search for a median (include/combine.glsl).
+    """Return how many loop iterations the pass compose_search takes for a median, in an invocation.
+
+    shaders/include/combine.glsl has the loops.
 
     Args:
-        rows: the number of pieces
-        frames: the number of frames
-        kind: the format of their textures
+        rows: The number of pieces in the table of shutters.
+        frames: The number of frames.
+        kind: The format of the frames' textures.
     """
     scans = 5 if kind == "rgba8" else 10
     return scans * frames * (1 + 4 * (1 + rows.bit_length()))

@@ -1,4 +1,4 @@
-"""Reads passes from shaders/: each is a step of a file, with what it binds.
+"""Read compute passes from the files in shaders/: each pass is a step of a file, with the names of what it binds.
 
 A file with several steps has each between `#ifdef STEP` and `#endif`. Declarations are read here, because Blender's
 `gpu` module needs them, and moderngl needs binding points. So #include and conditions are resolved here. A condition
@@ -26,7 +26,13 @@ _BETWEEN = re.compile(r"(in|out) (\w+) (\w+);")
 
 @dataclass(frozen=True)
 class Image:
-    """An image array that a pass binds: its GLSL format, and whether the pass loads from it and stores to it."""
+    """An image array that a pass binds.
+
+    Attributes:
+        format: Its GLSL format, such as rgba32f.
+        reads: Whether the pass loads from it.
+        writes: Whether the pass stores to it.
+    """
 
     format: str
     reads: bool
@@ -35,21 +41,21 @@ class Image:
 
 @dataclass(eq=False)
 class Pass:
-    """A compute pass, or a vertex or fragment stage, made by `read_pass`.
+    """A compute, vertex or fragment shader, with the names and types of what it binds. `read_pass` makes it.
 
     Attributes:
-        file: its file in shaders/, without .glsl
-        step: its step there; "" if the file has only one
-        defines: {name: value} of its other macros
-        source: the whole compute shader in GLSL 4.3
-        body: the source without macros and declarations, which Blender's `gpu` module adds
-        samplers: {name: GLSL type}
-        images: {name: Image}
-        constants: {name: GLSL type} of its uniforms
-        blocks: {name: length} of its uniform blocks, each an array of vec4
-        ins: {name: GLSL type} of a stage's inputs
-        outs: {name: GLSL type} of a stage's outputs
-        local_size: invocations of a workgroup (x, y, z)
+        file: Its file in shaders/, without .glsl.
+        step: Its step there; "" if the file has only one.
+        defines: {name: value} of its other macros.
+        source: The whole compute shader in GLSL 4.3.
+        body: The source without macros and declarations, which Blender's `gpu` module adds.
+        samplers: {name: GLSL type}.
+        images: {name: Image}.
+        constants: {name: GLSL type} of its uniforms.
+        blocks: {name: length} of its uniform blocks, each an array of vec4.
+        ins: {name: GLSL type} of the inputs of a vertex or fragment shader.
+        outs: {name: GLSL type} of its outputs.
+        local_size: Invocations of a workgroup (x, y, z).
     """
 
     file: str
@@ -72,7 +78,13 @@ class Pass:
 
 @cache
 def read_pass(file: str, step: str = "", **defines: int | str) -> Pass:
-    """Return the pass of a step of shaders/FILE.glsl with these macros: the same object for the same arguments."""
+    """Return a pass from shaders/. It is the same object for the same arguments.
+
+    Args:
+        file: The file's name, without .glsl.
+        step: The step in the file; "" if it has only one.
+        defines: {name: value} of macros.
+    """
     program = Pass(file, step, defines)
     source, body = [], []
     for line in _live(SHADERS / f"{file}.glsl", {step: 1, **defines}):
@@ -88,7 +100,7 @@ def read_pass(file: str, step: str = "", **defines: int | str) -> Pass:
 
 
 def _declared(program: Pass, line: str) -> str:
-    """Note what a line declares. Return the line with its bindings, or "" if it declares nothing."""
+    """Add what a line of GLSL declares to a pass. Return the line with binding points, or "" if it declares nothing."""
     defines, samplers, images = program.defines, len(program.samplers), len(program.images)
     if found := _LOCAL_SIZE.fullmatch(line):
         program.local_size = int(found[1]), int(found[2] or 1), 1
@@ -115,7 +127,10 @@ def _declared(program: Pass, line: str) -> str:
 
 
 def _live(path: Path, macros: Mapping[str, int | str]) -> Iterator[str]:
-    """Yield the lines whose conditions hold and blanks for others, with includes in place and #line numbers."""
+    """Yield the lines of a shader file that count for some macros, with #line directives for the compiler's errors.
+
+    Lines whose conditions do not hold become blank, and files that are included are put in place.
+    """
     yield "#line 1"
     around = [(True, True)]  # of the conditions around a line: whether its lines count, and no later branch can
     for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
@@ -141,10 +156,12 @@ def _live(path: Path, macros: Mapping[str, int | str]) -> Iterator[str]:
 
 
 def _holds(condition: str, macros: Mapping[str, int | str]) -> bool:
+    """Return whether the condition of an #if holds for some macros."""
     return any(all(_is(term, macros) for term in terms.split(" && ")) for terms in condition.split(" || "))
 
 
 def _is(term: str, macros: Mapping[str, int | str]) -> bool:
+    """Return whether a term of a condition holds: NAME, !NAME, NAME == number or defined(STEP)."""
     if not (found := _TERM.fullmatch(term)):
         raise ValueError(f"#if {term}: this condition is not supported")
     negated, step, name, number = found.groups()

@@ -1,1 +1,1 @@
-"""Rendering one film on several machines: claims, and versions of an edit."""
+"""Render one film on several machines: claims divide the frames, and a job file names the version of the edit."""

@@ -1,4 +1,4 @@
-"""Claims: dividing work among processes on machines that share a folder.
+"""Claims divide work, such as frames, among processes on machines that share a folder.
 
 A claim is a file that only one process can create. Its holder touches it while it works. A process that sees no change
 for a while, by its own clock, takes it over with a claim of the next generation, which again only one can create. No
@@ -22,10 +22,12 @@ BEAT = 10.0  # seconds between touches; network drives can show them a minute la
 
 
 class Claims:
-    """The claims of this process in a folder, released at the end of a `with`. For any thread.
+    """The claims that this process holds in a folder. At the end of a `with`, they are released. For any thread.
 
     Args:
-        patience, beat: Like PATIENCE and BEAT, in seconds.
+        folder: The folder, which all machines share.
+        patience: Seconds without a change after which another process's claim is abandoned. None: PATIENCE.
+        beat: Seconds after which this process touches its claims again. None: BEAT.
     """
 
     def __init__(self, folder: Path, patience: float | None = None, beat: float | None = None) -> None:
@@ -47,12 +49,12 @@ class Claims:
             self.release(name)
 
     def take(self, name: str) -> bool:
-        """Return whether this process now has the claim.
+        """Try to take a claim: return whether this process has it now.
 
-        Look whether the work is finished after this call, since the last holder may have finished it.
+        Check after this call whether the work has been done already, since the last holder may have finished it.
 
         Args:
-            name: Letters, digits and underscores.
+            name: Names the work: letters, digits and underscores.
 
         Raises:
             OSError: The folder cannot be written to.
@@ -67,22 +69,25 @@ class Claims:
         return True
 
     def release(self, name: str) -> None:
-        """Release a claim, and remove earlier generations of it."""
+        """Release a claim of this process: remove its file, and those of earlier generations."""
         with self._lock:
             generation = self._held.pop(name)
         for each in range(generation, -1, -1):
             _remove(self._path(name, each))
 
     def _path(self, name: str, generation: int) -> Path:
+        """Return the file of a claim's generation."""
         return self._folder / f".claim-{name}-{generation}"
 
     def _is_abandoned(self, path: Path) -> bool:
+        """Return whether a claim of another process has not changed for too long."""
         now, look = time.monotonic(), _look(path)
         if self._seen.get(path, (None,))[0] != look:
             self._seen[path] = look, now
         return look is not None and now - self._seen[path][1] > self._patience
 
     def _touch(self) -> None:
+        """Touch all claims of this process every few seconds, until it ends. It runs on a thread of its own."""
         while not self._ended.wait(self._beat):
             with self._lock:
                 held = list(self._held.items())
@@ -92,7 +97,10 @@ class Claims:
 
 
 def _make(path: Path) -> bool:
-    """Create a claim; return False if it exists. Its content tells people whose it is, and distinguishes claims."""
+    """Create the file of a claim; return False if it exists.
+
+    Its content tells people whose it is, and makes it differ from a later claim of the same name.
+    """
     try:
         file = path.open("x", encoding="utf-8")
     except FileExistsError:
@@ -107,9 +115,9 @@ def _make(path: Path) -> bool:
 
 
 def _look(path: Path) -> tuple[bytes, int] | int | None:
-    """Return a value that changes when a claim is touched or replaced; None: there is none.
+    """Return a value that changes when the file of a claim is touched or replaced; None: it is missing.
 
-    It is opened, so that network drives update it.
+    The file is opened, since network drives then look at its present state.
     """
     try:
         with path.open("rb") as file:
@@ -121,5 +129,6 @@ def _look(path: Path) -> tuple[bytes, int] | int | None:
 
 
 def _remove(path: Path) -> None:
+    """Remove the file of a claim, if possible."""
     with suppress(OSError):  # removed by another process, or another user's
         path.unlink()

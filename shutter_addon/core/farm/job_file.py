@@ -1,5 +1,7 @@
-"""The version of an edit, which marks its pictures on any machine, and the job file beside the pictures, which keeps
-machines from rendering different versions into one folder."""
+"""The version of an edit, and a job file beside rendered pictures that names it.
+
+The version also marks each picture. So machines that render into one folder notice if their edits differ.
+"""
 
 import hashlib
 import json
@@ -23,13 +25,13 @@ _WORDS = {
 
 @dataclass(frozen=True)
 class EditVersion:
-    """Everything that an edit's pictures depend on, except for the device.
+    """What tells versions of an edit apart: everything that its pictures depend on, except for the device.
 
     Attributes:
-        extension, blender: Versions.
-        colours: Of the OpenColorIO configuration: its SHA-256, the name of a built-in one, or "" for Blender's own.
+        extension, blender: Their versions.
+        colours: The OpenColorIO configuration: its SHA-256, the name of a built-in one, or "" for Blender's own.
         blend: SHA-256 of the .blend file, hexadecimal.
-        footage: SHA-256 of what the edit reads besides, in the order in the .blend file.
+        footage: SHA-256 of all other files that the edit reads, in the order in the .blend file.
     """
 
     extension: str
@@ -40,33 +42,46 @@ class EditVersion:
 
     @property
     def key(self) -> str:
-        """16 hexadecimal digits that are equal for copies of the edit, regardless of paths."""
+        """16 hexadecimal digits that stand for the version, equal for copies of the edit wherever these lie."""
         return hashlib.sha256(json.dumps(astuple(self)).encode()).hexdigest()[:16]
 
 
 def note(key: str) -> str:
-    """Return the text for a picture's metadata."""
+    """Return the text that marks a picture, in its metadata, with the key of an edit's version."""
     return _NOTE + key
 
 
 def key_in(text: str) -> str | None:
-    """Return the key in a picture's metadata, or None."""
+    """Return the key in a picture's metadata that `note` made, or None."""
     match = re.fullmatch(re.escape(_NOTE) + "([0-9a-f]{16})", text)
     return match and match[1]
 
 
 class JobError(UserError, ValueError):
-    """The job file is damaged, or of another version. The message is one sentence."""
+    """The job file in a folder is damaged, or names another version of the edit. The message is one sentence."""
 
 
 def write(folder: Path, version: EditVersion) -> None:
-    """Write the job file into the pictures' folder, whole or not at all. OSError: it cannot be written."""
+    """Write the job file for an edit's version into the folder of the pictures, whole or not at all.
+
+    Raises:
+        OSError: It cannot be written.
+    """
     with atomic_write.writing(folder / NAME) as part:
         part.write_text(json.dumps({"version": 1, "edit": asdict(version)}, indent=1) + "\n", encoding="utf-8")
 
 
 def guard(folder: Path, here: EditVersion) -> None:
-    """Raise JobError if a folder's job is of another version than `here`. OSError: the job file cannot be read."""
+    """Check that a folder's job file, if there is one, names the version of the edit that this machine has.
+
+    Args:
+        folder: The folder of the pictures.
+        here: The version on this machine.
+
+    Raises:
+        JobError: It names another version, or is damaged.
+        OSError: It cannot be read.
+    """
     path = folder / NAME
     try:
         job = json.loads(path.read_bytes())["edit"]

@@ -1,1 +1,1 @@
-"""Frames: what sources offer, light, and which frame a strip shows."""
+"""Frames: the interface of their sources, conversions of light, and which frame a retimed strip shows."""

@@ -1,6 +1,6 @@
-"""The interface of every source of frames, and the forms of a frame: pixels, planes of luma and chroma, moments.
+"""The interface of all sources of frames, and the forms of a frame: pixels, planes of luma and chroma, or a moment.
 
-RGB of planes equals libswscale's to the bit.
+A moment lies between two filmed frames. RGB made from planes equals that of libswscale, which Blender uses, to the bit.
 """
 
 from __future__ import annotations
@@ -27,7 +27,15 @@ _MATRICES = {1: (117489, 138438, 13975, 34925), 2: _BT601, 5: _BT601, 6: _BT601}
 
 @dataclass(frozen=True)
 class Matrix:
-    """Integers that convert samples to RGB: luma's offset in 1/512 of a level, and factors."""
+    """The whole numbers with which 8-bit samples of luma and chroma are converted to RGB, as in libswscale.
+
+    Factors are in units of 1/8192.
+
+    Attributes:
+        offset: What is subtracted from luma, in 1/512 of a level.
+        luma: The factor of luma for all three colors.
+        red_of_cr, green_of_cb, green_of_cr, blue_of_cb: The factors of chroma (less 128), which are added.
+    """
 
     offset: int
     luma: int
@@ -38,10 +46,11 @@ class Matrix:
 
 
 def matrix(space: int, full: bool) -> Matrix | None:
-    """Return the matrix of a colour space by its number in ITU-T H.273; None: neither BT.601 nor BT.709.
+    """Return the conversion from samples to RGB for a color space, or None if that is neither BT.601 nor BT.709.
 
     Args:
-        full: Whether samples have full range.
+        space: Its matrix coefficients as a number of ITU-T H.273; 2: unspecified, which counts as BT.601.
+        full: Whether samples have the full range 0 … 255 instead of 16 … 235.
     """
     if space not in _MATRICES:
         return None
@@ -54,27 +63,30 @@ def matrix(space: int, full: bool) -> Matrix | None:
 
 
 def _rounded(factor: int) -> int:
-    """Round to units of 1/8192, as libswscale does."""
+    """Round a factor in units of 1/65536 to units of 1/8192, as libswscale does."""
     return (factor + 4) >> 3
 
 
 def chroma_step(length: int) -> int:
-    """Return the step between pixels in the chroma planes, in 1/65536 of a sample, for an axis of `length` pixels.
+    """Return how far apart neighboring pixels are in the chroma planes, in 1/65536 of a sample.
 
-    Pixel i has the sample (i · step + step // 2) >> 16.
+    Pixel i has the chroma sample (i · step + step // 2) >> 16.
+
+    Args:
+        length: The pixels along the axis, which has ⌈length / 2⌉ samples of chroma.
     """
     return (((length + 1) // 2 << 16) + length // 2) // length
 
 
 @dataclass(frozen=True)
 class Planes:
-    """An opaque 8-bit frame with one sample of chroma per 2 × 2 pixels.
+    """An opaque 8-bit frame as a decoder gives it, with one sample of chroma for 2 × 2 pixels. GPUs convert it to RGB.
 
     Attributes:
         luma: uint8 (H, W), top row first.
         chroma: Cb and Cr, uint8 (⌈H/2⌉, ⌈W/2⌉) each.
-        matrix: Converts them to RGB.
-        rgba: Returns the whole frame, like FrameSource.read.
+        matrix: How they are converted to RGB.
+        rgba: Returns the converted frame, as FrameSource.read does.
     """
 
     luma: np.ndarray
@@ -84,10 +96,11 @@ class Planes:
 
     @property
     def nbytes(self) -> int:
+        """The bytes that its samples take."""
         return sum(plane.nbytes for plane in (self.luma, *self.chroma))
 
     def samples(self, rows: slice, columns: slice) -> np.ndarray:
-        """Return RGB uint8 (h, w, 3) of some rows and columns, without converting others."""
+        """Return the RGB values uint8 (h, w, 3) of some rows and columns, without a conversion of the others."""
         m, shape = self.matrix, self.luma.shape
         down, right = _chroma_places(rows, shape[0]), _chroma_places(columns, shape[1])
         luma = self.luma[rows, columns].astype(np.int32)
@@ -107,22 +120,28 @@ class Planes:
 
 
 def _chroma_places(chosen: slice, length: int) -> np.ndarray:
-    """Return the indices of the chroma samples of pixels on an axis of `length` pixels."""
+    """Return the indices of the chroma samples of some pixels on an axis of `length` pixels."""
     step = chroma_step(length)
     return (np.arange(length)[chosen] * step + step // 2) >> 16
 
 
 class Pair(Protocol):
-    """What lies between two frames."""
+    """Makes the moments between two frames, by their optical flow (media/flow.py has the only implementation)."""
 
     def with_ends(self, first: np.ndarray, second: np.ndarray) -> Pair:
-        """Return what lies between two other frames (H, W, 4) that move alike."""
+        """Return a copy for two other frames (H, W, 4), to which the same flow applies."""
 
     def moment(self, pair: tuple[int, int], number: int, steps: int) -> np.ndarray | Moment:
-        """Return a Moment, or the nearer frame if the two have nothing in common."""
+        """Return a moment between the frames. If they have nothing in common, it is the nearer frame (H, W, 4) itself.
+
+        Args:
+            pair: The numbers of the frames, for Moment.pair.
+            number: Which moment, 1 to steps − 1.
+            steps: Into how many steps the time between the frames is divided.
+        """
 
     def rgba(self, moment: Moment) -> np.ndarray:
-        """Make the frame of a moment, as FrameSource.read gives it."""
+        """Make the frame (H, W, 4) of a moment, as FrameSource.read gives it."""
 
     def values(self, moment: Moment, first: np.ndarray, second: np.ndarray) -> np.ndarray:
         """Return values (H, W) at a moment, given those of both frames, float32, which move like the frames."""
@@ -130,7 +149,7 @@ class Pair(Protocol):
 
 @dataclass(frozen=True)
 class Moment:
-    """A moment between two frames.
+    """What a frame at a time between two filmed frames is made from. A GPU or `rgba` makes it.
 
     Both frames are looked up along paths at key moments, equally far apart in time; other moments are mixes of the two
     key moments around them, in linear light. A part of the picture that moves less has fewer key moments.
@@ -156,12 +175,12 @@ class Moment:
     between: Pair
 
     def rgba(self) -> np.ndarray:
-        """Return the frame, as FrameSource.read gives it."""
+        """Make the frame (H, W, 4), as FrameSource.read gives it."""
         return self.between.rgba(self)
 
     @property
     def nbytes(self) -> int:
-        """Bytes that it takes, of what all moments of the pair share."""
+        """The bytes that it takes: its part of the frames and vectors that all moments of the pair share."""
         return (self.vectors.nbytes + sum(end.nbytes for end in self.ends)) // self.steps
 
 
@@ -169,33 +188,34 @@ Decoded: TypeAlias = np.ndarray | Planes | Moment  # results of FrameSource.deco
 
 
 def as_rgba(frame: Decoded) -> np.ndarray:
-    """Convert a result of FrameSource.decoded to that of `read`."""
+    """Convert a result of FrameSource.decoded to that of `read`: an array (H, W, 4), RGBA."""
     return frame if isinstance(frame, np.ndarray) else frame.rgba()
 
 
 class ShotFinder(Protocol):
-    """A finder of a source's cuts. It may read frames, which then wait for the source's `read`.
+    """Finds the cuts of a source (media/cuts.py). Frames are numbered from 0.
 
-    Frames count from 0.
+    It may read frames. These are kept until the source's `read` is called for them, so that none is decoded twice.
     """
 
     def around(self, index: int, low: int, high: int, *, known: bool = False) -> range:
-        """Return the frames of the shot around frame `index`, for a window of the frames from `low` to `high`.
-
-        Cuts beyond the window are not searched: the range then ends with the clip.
+        """Return the frames of the shot to which a frame belongs: those between the cuts around it.
 
         Args:
-            known: Read nothing, and assume no cut where it is unknown.
+            index: The frame.
+            low, high: The first and last frame that matter. Cuts beyond are not searched: the range then goes to the
+                clip's start or end.
+            known: Read nothing, and assume that there is no cut where nothing is known.
         """
 
     def lacking(self, index: int, low: int, high: int) -> set[int]:
-        """Return the frames that `around` would read for these arguments, if it found no more cuts."""
+        """Return the frames that `around` would have to read for the same arguments, if it finds no new cuts."""
 
     def handed(self) -> set[int]:
-        """Return the frames that were read and wait for `read`."""
+        """Return the frames that were read and are kept for `read`."""
 
     def release(self) -> None:
-        """Drop the frames that wait for `read`."""
+        """Drop the frames that are kept for `read`."""
 
 
 class FrameSource(ABC):
@@ -204,22 +224,22 @@ class FrameSource(ABC):
     Attributes:
         path: The movie, or the first file of the sequence.
         file_kind: Format, codec and samples of the file, as the libraries name them.
-        files: The movie, or one per frame.
-        width, height: Pixels.
-        count: Frames as Blender's strip counts them (content_duration).
+        files: The movie, or the file of each frame.
+        width, height: In pixels.
+        count: The number of frames, as Blender's strip counts them (content_duration).
         fps: Frames per second; None for an image sequence.
-        dtype: uint8, uint16, float16 or float32; integers stand for 0 … 1.
+        dtype: The type of samples: uint8, uint16, float16 or float32; the range of integers stands for 0 … 1.
         transfer: "srgb" (sRGB display values) or "linear" (scene linear, Rec.709 primaries).
         alpha: "opaque", "straight" or "premultiplied".
         options: What samples depend on besides the files, {name: plain value}.
         has_audio: Whether the file has sound.
-        left_out: A sentence about files beside the sequence that do not belong to it, or "".
-        step: Every step-th frame was filmed, from the first on.
-        shots: The finder of cuts; None: there are none.
+        left_out: A sentence for the user about files beside the sequence that do not belong to it, or "".
+        step: Every step-th frame was filmed, from the first on; the others are moments between them.
+        shots: What finds its cuts; None: it has none.
         from_proxy: Whether frames come from a proxy where it has them.
         by_blender: Whether a second Blender decodes them because PyAV is missing.
         repeats: Whether repeated frames were found and replaced by moments.
-        windows: How many windows of a picture read the source, and need room in caches.
+        windows: How many windows of one picture read this source, each of which needs memory for it.
     """
 
     path: Path
@@ -252,7 +272,11 @@ class FrameSource(ABC):
         """
 
     def decoded(self, index: int) -> Decoded:
-        """Return a frame in its fastest form: planes if only their conversion is missing, else like `read`."""
+        """Return a frame in the form that is fastest to get, which may be planes or a moment, or as `read` does.
+
+        Raises:
+            MediaError, IndexError: As for `read`.
+        """
         return self.read(index)
 
     def want(self, indices: Iterable[int]) -> None:
@@ -271,17 +295,22 @@ class FrameSource(ABC):
 
 
 class SourceFile(Hashable, Protocol):
-    """What opens a source; equal where it gives the same frames.
+    """Opens a source, such as that of a matte. Two are equal if they give the same frames.
 
-    Of a matte's, frames are values (height, width) float32, 0 to 1, and `read` clamps to the file's frames.
+    Frames of a matte are values (height, width) float32, 0 to 1, and `read` takes any index: it clamps it to the file's
+    frames.
     """
 
     def open(self) -> FrameSource:
-        """Open the source. MediaError: it cannot be read."""
+        """Open the source.
+
+        Raises:
+            MediaError: It cannot be read.
+        """
 
 
 class _Forwarded:
-    """An attribute of the wrapped source, unless the wrapper sets its own."""
+    """A descriptor that returns the wrapped source's attribute of this name, unless the wrapper sets its own."""
 
     def __init__(self, name: str) -> None:
         self._name = name
@@ -291,10 +320,15 @@ class _Forwarded:
 
 
 class SourceWrapper(FrameSource):
-    """A source around another one, with its attributes and frames unless a subclass changes them."""
+    """A source around another one, with its attributes and frames unless a subclass or a function changes them."""
 
     def __init__(self, source: FrameSource, frames: Callable[[int], Decoded] | None = None) -> None:
-        """Wrap a source; `frames` replaces its `decoded`, and with it `read`."""
+        """Wrap a source.
+
+        Args:
+            source: The other source.
+            frames: Returns the frame of an index, and replaces `decoded` and `read`. None: they are the source's.
+        """
         self._source, self._frames_of = source, frames
 
     def read(self, index: int) -> np.ndarray:

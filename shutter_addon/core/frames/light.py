@@ -1,4 +1,7 @@
-"""Light and code values: the sRGB transfer, in float64 or the precision of the argument, for arrays of any shape."""
+"""Conversions between linear light and sRGB code values, and between straight and premultiplied alpha.
+
+Arrays may have any shape; results have the precision of the argument.
+"""
 
 from __future__ import annotations
 
@@ -11,29 +14,34 @@ REC709 = np.array([0.2126, 0.7152, 0.0722], np.float32)  # luminance of linear l
 
 
 def to_linear(encoded: ArrayLike) -> np.ndarray:
-    """Convert sRGB code values (1.0 = white) to linear light. Negative values use the linear foot."""
+    """Convert sRGB code values (1.0 is white) to linear light. Negative values use the curve's linear foot."""
     encoded = np.asarray(encoded)
     curve = ((np.maximum(encoded, 0.04045) + 0.055) / 1.055) ** 2.4
     return np.where(encoded <= 0.04045, encoded / 12.92, curve).astype(encoded.dtype)
 
 
 def to_encoded(linear: ArrayLike) -> np.ndarray:
-    """Convert linear light to sRGB code values; the inverse of `to_linear`."""
+    """Convert linear light (1.0 is white) to sRGB code values; the inverse of `to_linear`."""
     linear = np.asarray(linear)
     curve = 1.055 * np.maximum(linear, 0.0031308) ** (1 / 2.4) - 0.055
     return np.where(linear <= 0.0031308, linear * 12.92, curve).astype(linear.dtype)
 
 
 def premultiplied(rgba: np.ndarray, convert: Callable[[np.ndarray], np.ndarray] | None = None) -> np.ndarray:
-    """Premultiply straight RGBA (…, 4), with its colours converted first."""
+    """Convert straight RGBA (…, 4) to premultiplied. `convert` converts its colours (…, 3) before that."""
     rgb = rgba[..., :3] if convert is None else convert(rgba[..., :3])
     return np.concatenate([rgb * rgba[..., 3:], rgba[..., 3:]], axis=-1)
 
 
 def over_black(frame: np.ndarray, alpha: str) -> np.ndarray:
-    """Return a source's frame (…, 4) over black, in its code values.
+    """Return a source's frame (…, 4) over black, as code values.
 
-    Floats and straight alpha give float32, clipped to 0 … 1. Other integers stay.
+    Args:
+        frame: Samples as from FrameSource.read.
+        alpha: The source's.
+
+    Returns:
+        float32, 0 … 1, if samples are floats or alpha is straight. Other integers stay as they are.
     """
     if frame.dtype.kind == "f":
         frame = np.nan_to_num(frame.astype(np.float32), copy=False).clip(0, 1)
@@ -44,16 +52,17 @@ def over_black(frame: np.ndarray, alpha: str) -> np.ndarray:
 
 
 def straight(rgba: np.ndarray) -> np.ndarray:
-    """Convert premultiplied RGBA (…, 4) to straight; transparent pixels keep their colours (light without cover)."""
+    """Convert premultiplied RGBA (…, 4) to straight. Transparent pixels keep their colours: they may emit light."""
     return np.concatenate([rgba[..., :3] / _cover(rgba), rgba[..., 3:]], axis=-1)
 
 
 def linearised(rgba: np.ndarray) -> np.ndarray:
-    """Convert premultiplied RGBA (…, 4) of sRGB code values to linear light; light without cover stays."""
+    """Convert premultiplied RGBA (…, 4) from sRGB code values to linear light. Transparent pixels may emit light."""
     cover = _cover(rgba)
     return np.concatenate([to_linear(rgba[..., :3] / cover) * cover, rgba[..., 3:]], axis=-1)
 
 
 def _cover(rgba: np.ndarray) -> np.ndarray:
+    """Return what colours were premultiplied with, (…, 1): the alpha, or 1 where that is 0."""
     alpha = rgba[..., 3:]
     return np.where(alpha > 1e-6, alpha, 1)  # a smaller alpha is rounding and counts as transparent

@@ -1,4 +1,4 @@
-"""Timing of a strip in Blender's sequencer: trimmed, retimed, reversed, strobed."""
+"""Which frame of its content a strip of Blender's sequencer shows: trimmed, retimed, reversed or with strobe."""
 
 import math
 from collections.abc import Sequence
@@ -9,7 +9,13 @@ import numpy as np
 
 @dataclass(frozen=True)
 class RetimingKey:
-    """A key: position in frames of the content before retiming, and the shown position, 0 to 1 of the content."""
+    """A retiming key of a strip, as Blender stores it.
+
+    Attributes:
+        index: Its position in frames of the content before retiming.
+        flag: Bits of eSeqRetimingKeyFlag; the first one begins a smooth transition between two speeds.
+        factor: The position in the content that is shown there, 0 to 1.
+    """
 
     index: float
     flag: int
@@ -18,11 +24,13 @@ class RetimingKey:
 
 @dataclass(frozen=True)
 class StripTiming:
-    """Timing of a source strip. Fields have Blender's names and count timeline frames.
+    """The timing of a strip that shows footage. Fields have Blender's names and count timeline frames.
 
     Attributes:
-        first: The frame of the medium that is the content's first.
+        name: The strip's.
+        first: The number of the footage's frame that is the content's first.
         scene_fps: Frames per second of the edit.
+        strobe: Only every n-th frame of the content is shown, and held; 1: all are.
         keys: The retiming keys, finite and in order.
         is_known: Whether the keys could be read; otherwise constant speed is assumed.
     """
@@ -42,16 +50,18 @@ class StripTiming:
 
     @property
     def start(self) -> int:
-        """The first frame of the medium that is shown, without retiming."""
+        """The first frame of the footage that is shown, without retiming."""
         return self.first + self.content_trim_start
 
 
 def position(strip: StripTiming, rate: float, length: int, frame: float) -> np.float32:
-    """Return the position in the strip's content of a timeline frame, in frames, in float32 like Blender.
+    """Return which position in a strip's content a timeline frame shows, in frames from 0, in float32 like Blender.
 
     Args:
+        strip: The strip.
         rate: From `playback_rate`.
-        length: Frames of the content.
+        length: The number of frames of the content.
+        frame: The timeline frame.
     """
     end = strip.content_end - 1
     position = np.float32(max(end - frame if strip.use_reverse_frames else frame - strip.content_start, 0.0))
@@ -65,10 +75,15 @@ def position(strip: StripTiming, rate: float, length: int, frame: float) -> np.f
 
 
 def playback_rate(strip: StripTiming, length: int, fps: float) -> float:
-    """Return the source frames per timeline frame before retiming.
+    """Return how many frames of a strip's content pass in a timeline frame, before retiming.
 
-    That is 1, or the movie's rate / the scene's if the strip keeps its speed. Blender's API does not tell; the strip's
-    length does.
+    That is the movie's rate / the scene's if the strip was imported to keep the movie's speed, else 1. Blender's API
+    does not tell which. The strip's length does.
+
+    Args:
+        strip: The strip.
+        length: The number of frames of the content.
+        fps: The movie's frames per second; 0 for images.
     """
     rate = fps / strip.scene_fps
     if rate <= 0:  # images
@@ -79,7 +94,10 @@ def playback_rate(strip: StripTiming, length: int, fps: float) -> float:
 
 
 def retimed(keys: Sequence[RetimingKey], position: float | np.float32) -> np.float32:
-    """Return the keys' value, 0 to 1, at a position in the content: lines, and arcs for transitions."""
+    """Return the position in the content, 0 to 1, that retiming keys show at a position before retiming, in frames.
+
+    It is linear between keys, and an arc where Blender makes a smooth transition between two speeds.
+    """
     k = max((i for i, key in enumerate(keys[:-1]) if key.index <= position), default=0)
     first, second = keys[k], keys[k + 1]
     speed = _speed(first, second)
@@ -93,13 +111,17 @@ def retimed(keys: Sequence[RetimingKey], position: float | np.float32) -> np.flo
 
 
 def _speed(first: RetimingKey, second: RetimingKey) -> np.float32:
+    """Return the change of the shown position (0 to 1) per frame between two keys."""
     return np.float32(second.factor - first.factor) / np.float32(max(second.index - first.index, 1e-9))
 
 
 def _arc(
     first: RetimingKey, speed_in: np.float32, second: RetimingKey, speed_out: np.float32, position: float | np.float32
 ) -> np.float32:
-    """Return the value of the circle that leaves the first key with one slope and reaches the second with the other."""
+    """Return the shown position on a smooth transition between two speeds.
+
+    It is the circle that leaves the first key with one slope and reaches the second key with the other.
+    """
     # Its centre is on both normals, where x + slope·y is the same as at the key.
     slopes = np.array([[1.0, speed_in], [1.0, speed_out]])
     sums = [first.index + speed_in * first.factor, second.index + speed_out * second.factor]

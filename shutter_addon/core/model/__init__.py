@@ -1,1 +1,1 @@
-"""The effect as plain data, with values over time, and its state at a frame."""
+"""The effect as plain data: shutters, regions and options that change over time, and its state at one frame."""

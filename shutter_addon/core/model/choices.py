@@ -1,6 +1,6 @@
-"""The choices of an effect's properties, as (identifier, name, description).
+"""The choices of an effect's properties: (identifier, label, description), as for the enum properties of Blender.
 
-Identifiers are the recipe's words in capitals.
+Recipes write identifiers in small letters. Blender shows the label, and the description as its tooltip.
 """
 
 # The translation context of labels that Blender's own catalog translates differently, such as "Frames".

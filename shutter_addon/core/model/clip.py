@@ -1,4 +1,7 @@
-"""Clips as plain data: the footage of an effect, and which frame the timeline shows. No file is opened."""
+"""The footage of an effect as plain data: its size and length, and which of its frames the timeline shows.
+
+No file is opened here.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,13 @@ from .keyframes import Channel
 
 
 class Shown(NamedTuple):
-    """A timeline frame, the clip's frame that it shows, and the direction: 1, or −1 where the clip runs backward."""
+    """Which frame of the footage is shown at a timeline frame.
+
+    Attributes:
+        frame: The timeline frame, possibly between two whole ones.
+        source_frame: The frame of the footage, from 0. With Smooth, moments between filmed frames count as well.
+        direction: 1, or −1 where the footage plays backward.
+    """
 
     frame: float
     source_frame: int
@@ -26,14 +35,15 @@ class Shown(NamedTuple):
 
 @dataclass(frozen=True)
 class Clip:
-    """The footage of an effect and its timing.
+    """The size, length and timing of an effect's footage.
 
     Attributes:
         width, height: Of its pictures, in pixels.
-        count: Frames, including moments between them; every step-th was filmed, from the first on.
+        count: The number of frames, including moments: frames that are made between filmed ones (Smooth).
+        step: Every step-th frame was filmed, from the first on; the others are moments.
         fps: Frames per second; None for images.
-        timing: Which frame a timeline frame shows: the strip's timing, or keys (Effect.time). None: frame 1 shows the
-            first filmed frame, and so on, as in recipes.
+        timing: Which frame a timeline frame shows: the timing of a strip, or a channel of source time (Effect.time).
+            None: timeline frame 1 shows the first filmed frame, and so on, as in recipes.
     """
 
     width: int
@@ -45,22 +55,26 @@ class Clip:
 
     @staticmethod
     def of(source: FrameSource, timing: StripTiming | Channel | None = None) -> Clip:
+        """Return the clip of an opened source, with a timing."""
         return Clip(source.width, source.height, source.count, source.step, source.fps, timing)
 
     def stepped(self, factor: int) -> Clip:
-        """Return the clip with `factor` moments per filmed frame."""
+        """Return this clip, which has no moments, with `factor` − 1 moments between each two filmed frames."""
         fps = None if self.fps is None else self.fps * factor
         return replace(self, count=(self.count - 1) * factor + 1, step=factor, fps=fps)
 
     def shown(self, frame: float) -> Shown:
-        """Return what a timeline frame shows."""
+        """Return which frame of the footage a timeline frame shows, and in which direction the footage plays there."""
         if isinstance(self.timing, StripTiming):
             return Shown(frame, self._shown_by(self.timing, frame), -1 if self.timing.use_reverse_frames else 1)
         filmed, backward = self.timing.at(frame) if self.timing else (frame, False)
         return Shown(frame, nearest(filmed - 1, self.step, self.count), -1 if backward else 1)
 
     def position(self, frame: float) -> float:
-        """Return the position of a timeline frame in the clip, in frames, before rounding to a shown frame."""
+        """Return the place in the footage that a timeline frame shows, as a frame number from 0 that is not rounded.
+
+        Strobe, which holds frames of a strip, is ignored. Exposures that last a timeline frame are measured by it.
+        """
         if isinstance(self.timing, StripTiming):
             length, rate = self._content(self.timing)
             position = float(retiming.position(replace(self.timing, strobe=1.0), rate, length, frame))
@@ -69,9 +83,9 @@ class Clip:
 
     @property
     def ends(self) -> tuple[float, float]:
-        """The positions (see `position`) of the strip's first and last frame, which the strip repeats beyond its ends.
+        """The values of `position` at the first and last frame of a strip's content, which it holds beyond its ends.
 
-        Without a strip's timing they are −∞ and ∞: no frame repeats.
+        Without a strip they are −∞ and ∞: no frame is held.
         """
         if isinstance(self.timing, StripTiming):
             first, (length, _rate) = self.timing.start, self._content(self.timing)
@@ -79,9 +93,10 @@ class Clip:
         return -math.inf, math.inf
 
     def _shown_by(self, strip: StripTiming, frame: float) -> int:
-        """Return the frame that a strip shows, with trims, cuts, playback rate, retiming and strobe as in Blender.
+        """Return the source frame that Blender shows for a strip at a timeline frame.
 
-        With moments between filmed frames, which Blender does not know, it is the nearest moment.
+        Trims, cuts, playback rate, retiming and strobe count as in Blender. If the clip has moments, which Blender does
+        not know, it is the nearest moment.
         """
         length, rate = self._content(strip)
 
@@ -99,12 +114,21 @@ class Clip:
         return strip.start + min(index, length - 1)
 
     def _content(self, strip: StripTiming) -> tuple[int, float]:
-        """Return the strip's number of filmed frames, and how many pass per timeline frame before retiming."""
+        """Return how many filmed frames a strip has after trimming, and how many pass per timeline frame.
+
+        The second is the playback rate before retiming.
+        """
         filmed = (self.count - 1) // self.step + 1
         length = max(1, filmed - strip.content_trim_start - strip.content_trim_end)
         return length, retiming.playback_rate(strip, length, float(self.fps or 0) / self.step)
 
 
 def nearest(filmed: float, step: int, count: int) -> int:
-    """Return the frame nearest to a time in filmed frames, from 0, in a clip with `step` frames per filmed one."""
+    """Return the number of the frame that is nearest to a time, from 0 to count − 1.
+
+    Args:
+        filmed: The time in filmed frames, from 0.
+        step: Frames per filmed frame (Clip.step).
+        count: The number of frames.
+    """
     return min(max(math.floor(filmed * step + 0.5), 0), count - 1)

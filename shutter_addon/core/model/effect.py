@@ -1,8 +1,8 @@
 """The effect as plain data: shutters, regions, options and source time, each a value or a channel over time.
 
 Recipes (core/recipes/recipe_file.py) and effect strips in Blender (blender/data/snapshot.py) both become an `Effect`.
-Frame numbers depend on the origin: a recipe counts from 1, Blender uses timeline frames. fields.py explains the
-declarations of the properties.
+In one from a recipe, frame 1 is the strip's first; in one from Blender, frames are timeline frames. fields.py explains
+how the properties are declared.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ _TOO_MANY_POINTS = 'region "{name}": more than {most} points together with the r
 
 @dataclass(frozen=True)
 class Moves:
-    """Where something lies in the picture, over time.
+    """The placement of a region or of the camera over time.
 
     Attributes:
-        location: Channel of (2,) fractions of the picture.
+        location: Channel of (x, y) in fractions of the picture, y up.
         rotation: Channel of degrees, counter-clockwise.
-        scale: Channel of a factor about the centre.
+        scale: Channel of a factor; it acts about the centre, as rotation does.
     """
 
     location: Channel = field(default=keyframes.Constant((0.0, 0.0)))
@@ -48,7 +48,11 @@ class Moves:
 
     @staticmethod
     def keyed(keys: Sequence[tuple[float, Placement, keyframes.Ease]]) -> Moves:
-        """Return moves with keys of (frame, placement, ease until the next key)."""
+        """Return moves with keys, or still ones without any.
+
+        Args:
+            keys: (frame, placement, ease until the next key), by ascending frame.
+        """
         if not keys:
             return Moves()
         frames, placements, eases = zip(*keys, strict=True)
@@ -67,23 +71,30 @@ class Moves:
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """Something that a shutter can follow: a region, or the camera.
+    """Something whose motion a shutter can follow: a region, or the camera.
 
     Attributes:
-        drawings: Strokes, about whose centre the subject turns and scales. None: about the picture's centre.
+        moves: Its placement over time.
+        drawings: Strokes, about whose centre it turns and scales. None: it does so about the picture's centre.
     """
 
     moves: Moves
     drawings: Drawings | None = None
 
     def placement(self, frame: float) -> Placement:
-        """Return the keyed placement at a frame."""
+        """Return where keys put the subject at a frame, apart from what is drawn."""
         return self.moves.at(frame)
 
     def centre(self, frame: float) -> np.ndarray | None:
         """Return the point (2,) about which the subject turns and scales, in fractions of the picture.
 
-        None where nothing is drawn. EffectError: the strokes are too far outside the picture.
+        Its location is not added.
+
+        Returns:
+            None where nothing is drawn.
+
+        Raises:
+            EffectError: The strokes are too far outside the picture.
         """
         if (shape := self._shape) is None:
             return np.array([0.5, 0.5])
@@ -91,9 +102,13 @@ class Subject:
         return motions.centre(strokes) if strokes else None
 
     def corners(self, frame: float) -> np.ndarray:
-        """Return the corners (4, 2) of the subject's box at a frame, in fractions of the picture.
+        """Return the corners (4, 2) of the box around the placed subject at a frame, in fractions of the picture.
 
-        (0, 2) where nothing is drawn. EffectError: as for `centre`.
+        Returns:
+            An array (0, 2) where nothing is drawn.
+
+        Raises:
+            EffectError: The strokes are too far outside the picture.
         """
         if (shape := self._shape) is None:
             return motions.PICTURE
@@ -107,12 +122,12 @@ class Subject:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AnyRegion(Subject):
-    """A part of the picture with its own shutter.
+    """The base of all regions: a part of the picture that gets a shutter of its own.
 
     Attributes:
-        shutter: Index of the shutter.
-        layer: See core/pixels/layering.py.
-        drawings: The strokes; None for mattes and ramps.
+        shutter: The shutter's index.
+        layer: Whether it is exposed by itself and laid over everything else (core/pixels/layering.py).
+        drawings: Its strokes; None for mattes and ramps.
     """
 
     name: str = Labelled("Name", "Name of the region").fixed(default="Region", absent="", most=limits.MAX_NAME)
@@ -127,7 +142,7 @@ class AnyRegion(Subject):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Region(AnyRegion):
-    """Strokes that give a shutter to what they touch (kind "line") or enclose ("lasso")."""
+    """A region of drawn strokes. The shutter is for what they cover (kind "line") or enclose ("lasso")."""
 
     kind: str
     width: Channel = Labelled("Width", "Width of the lines as a fraction of the picture's height").number(
@@ -145,11 +160,11 @@ class Region(AnyRegion):
 class MatteRegion(AnyRegion):
     """A region whose matte says how much of the shutter each pixel gets.
 
-    It moves about the picture's centre. Keys place a ramp. For other mattes, keys describe how the covered object
-    moves.
+    Keys place a ramp. Any other matte stays where it is; its keys only tell how the covered object moves, for exposures
+    that follow it. Rotation and scale are about the picture's centre.
 
     Attributes:
-        content: Channel of mattes.Content; as a recipe names it, FileContent or RampContent.
+        content: Channel of mattes.Content. In an effect from a recipe: FileContent or RampContent.
         blend, invert, feather, opacity: See mattes.Matte.
     """
 
@@ -163,18 +178,21 @@ class MatteRegion(AnyRegion):
     ).number(default=0.0, most=limits.MAX_DISTANCE, soft_most=0.2, precision=3, context=CONTEXT, recipe="width")
 
     def at(self, frame: float) -> mattes.Matte:
-        """Return the matte at a frame."""
+        """Return the region's matte at a frame."""
         opacity, feather = (float(channel.at(frame)) for channel in (self.opacity, self.feather))
         return mattes.Matte(self.shutter, self.content.at(frame), self.blend, opacity, feather, self.invert)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class OutlineRegion(MatteRegion):
-    """A region whose matte is enclosed by closed curves. Keys describe how the enclosed object moves, not the curves.
+    """A region whose matte is the inside of closed curves.
+
+    Keys tell how the enclosed object moves, for exposures that follow it. They do not move the curves.
 
     Attributes:
-        between: How the matte gets from one drawing to the next: "carried" follows the footage, "straight" moves the
-            curves linearly.
+        drawings: The curves, at the frames where they are drawn.
+        between: How the matte changes from one drawing to the next: "carried" follows the footage, "straight" moves the
+            curves' points in straight lines.
         content: Channel of mattes.FileFrame or mattes.Outline.
     """
 
@@ -184,9 +202,10 @@ class OutlineRegion(MatteRegion):
     )
 
     def drawn_at(self, frame: float) -> scribbles.Shape:
-        """Return the curves at a frame, as a lasso; those of a carried outline are only at its drawings.
+        """Return the curves at a frame as a lasso. A matte that follows the footage has them only where they are drawn.
 
-        EffectError: they are too far outside the picture.
+        Raises:
+            EffectError: They are too far outside the picture.
         """
         has_curves = self.between == "straight" or frame in self.drawings.frames
         strokes = tuple(self.drawings.at(frame)) if has_curves else ()
@@ -195,15 +214,15 @@ class OutlineRegion(MatteRegion):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SubjectRegion(MatteRegion):
-    """A region whose matte is a subject that a model finds under strokes.
+    """A region whose matte is a subject (a person, an animal, a thing) that a model finds under strokes.
 
-    It moves about the centre of its strokes or, without strokes, of its outlines.
+    Its rotation and scale are about the centre of its strokes or, without strokes, of its outlines.
 
     Attributes:
         drawings: Strokes on the subject.
         nots: Strokes on what is not the subject (*Not This*).
-        outlines: Closed curves. They overrule the model.
-        content: A channel of mattes.FileFrame.
+        outlines: Closed curves around the subject. They overrule the model.
+        content: Channel of mattes.FileFrame: the mattes that were found.
     """
 
     drawings: Drawings
@@ -215,27 +234,29 @@ class SubjectRegion(MatteRegion):
         return self.drawings if self.drawings.frames else self.outlines
 
     def drawn_at(self, frame: float) -> scribbles.Shape:
-        """Return the strokes that are drawn at this frame, as lines.
+        """Return the strokes that were drawn at exactly this frame, as a shape of lines.
 
         Raises:
-            EffectError: They lie too far outside the picture.
+            EffectError: They are too far outside the picture.
         """
         strokes = tuple(self.drawings.at(frame)) if frame in self.drawings.frames else ()
         return scribbles.Shape(shutter=self.shutter, kind="line", width=0.0, strokes=strokes)
 
 
 def drawn_outlines(drawings: Drawings) -> Channel:
-    """Return a channel of mattes.Outline that moves linearly from one drawing to the next."""
+    """Return a channel of mattes.Outline whose points go straight from drawing to drawing, with the drawings' eases."""
     return keyframes.Computed(lambda frame: mattes.Outline(outlines.curves(drawings.at(frame))))
 
 
 @dataclass(frozen=True)
 class FileContent:
-    """A matte file as a recipe names it: not yet a channel that can be read.
+    """A matte file as a recipe names it, before it becomes a channel of mattes.FileFrame.
 
     Attributes:
         path: A movie, or the first file of an image sequence, relative to the recipe's folder.
-        offset: The matte's frame, from 0, at the first frame of the source or timeline.
+        channel: The channel of the file that is the matte.
+        offset: The matte's frame, from 0, that belongs to the first frame of the footage or of the timeline.
+        timing: Which of these two the matte follows.
     """
 
     path: str
@@ -252,7 +273,7 @@ class FileContent:
 
 @dataclass(frozen=True)
 class RampContent:
-    """A ramp as a recipe names it: not yet a channel that can be read."""
+    """A ramp (a gradient) as a recipe names it, before it becomes a channel of mattes.Content."""
 
     ramp: Literal["linear", "radial", "angle", "luminance"] = Labelled("Ramp", "Shape of the ramp").choice(
         RAMPS, default="linear", absent=MISSING
@@ -260,17 +281,23 @@ class RampContent:
 
 
 def placed_ramp(kind: mattes.RampKind, moves: Moves) -> Channel:
-    """Return a channel of mattes.Ramp that keys move."""
+    """Return a channel of mattes.Ramp that keys move.
+
+    Args:
+        kind: The ramp's shape.
+        moves: Where it lies at each frame.
+    """
 
     return keyframes.Computed(lambda frame: mattes.Ramp(kind, moves.at(frame)))
 
 
 @dataclass(frozen=True)
 class Camera(Subject):
-    """How the camera's view moves in the picture, about the picture's centre.
+    """How the camera's view moves in the picture, about the picture's centre, so that shutters can follow it.
 
     Attributes:
-        influence: 0 to 1, scales exposures that follow the camera. At 0 they show only the current frame.
+        influence: Channel of 0 to 1, the length of exposures that follow the camera. At 0 they are the shown frame
+            only.
     """
 
     influence: Channel = Labelled(
@@ -283,7 +310,12 @@ STILL_CAMERA = Camera(Moves())
 
 @dataclass(frozen=True, kw_only=True)
 class Shutter:
-    """Bars over time, and how the exposed frames are combined. `follow`: what the exposure moves with."""
+    """A shutter over time: how much each frame contributes to a pixel, and how these frames are combined.
+
+    Attributes:
+        bars: The frames' contributions over time: a bar for each filmed frame of the window.
+        follow: The region or camera with which the exposure moves. None: it stays in its place.
+    """
 
     name: str = Labelled("Name", "Name of the shutter").fixed(default="Shutter", absent=MISSING, most=limits.MAX_NAME)
     color: tuple[float, float, float] = Labelled("Color", "Color of the shutter's bars, scribbles and matte").fixed(
@@ -321,28 +353,48 @@ class Shutter:
 
     @property
     def has_trail(self) -> bool:
-        """Whether the exposure lasts while the followed subject moves by a distance."""
+        """Whether the shutter is open while what it follows moves by `trail`. Its bars then only set the shape."""
         return self.follow is not None and self.length == "motion"
 
     def spread(self, steps: int, backward: bool = False) -> Callable[[np.ndarray], np.ndarray]:
-        """Return a function that turns bars of filmed frames into bars of moments, `steps` per filmed frame."""
+        """Return a function that turns bars of filmed frames (L,) into bars of moments (L · steps,).
+
+        Moments are filmed frames, and those made between them.
+
+        Args:
+            steps: Moments per filmed frame.
+            backward: Whether the footage plays backward.
+        """
         if self.length == "timeline" or self.has_trail:
             return partial(shutters.held, steps=steps)
         level = self.combine in EXTREMES
         return partial(shutters.smoothed, steps=steps, backward=backward, level=level)
 
     def filmed(self, moments: ArrayLike, steps: int, position: str) -> shutters.Filmed:
-        """Return bars of filmed frames for the bars of moments that recipes of version 1 have."""
+        """Convert bars of moments, which recipes of version 1 have, into bars of filmed frames.
+
+        Moments are filmed frames, and those made between them.
+
+        Args:
+            moments: (n,) bars.
+            steps: Moments per filmed frame.
+            position: Options.position.
+        """
         return shutters.filmed(moments, steps, position, self.spread(steps))
 
     def lost(self, keys: Sequence[ArrayLike], steps: int, position: str, interpolation: str) -> EffectError | None:
-        """Return a warning if bars of filmed frames cannot expose the same moments as the given bars of moments.
+        """Return a warning if bars of filmed frames cannot expose what a recipe of version 1 did with bars of moments.
+
+        Moments are filmed frames, and those made between them.
 
         Args:
-            keys: Bars of moments at each key.
+            keys: The bars of moments at each key.
+            steps: Moments per filmed frame.
+            position: Options.position.
+            interpolation: Options.interpolation. With "value", bars halfway between two keys are compared, too.
 
         Returns:
-            The first difference, at a key or where bars fade halfway between two keys; None without one.
+            A warning about the first difference, or None.
         """
         fading = [np.add(*pair) / 2 for pair in pairwise(keys)] if interpolation == "value" else []
         for moments in (*keys, *fading):
@@ -351,7 +403,10 @@ class Shutter:
         return None
 
     def combine_at(self, frame: float) -> Combine:
-        """Return the way to combine frames, with only the settings that affect it, so that equal ways compare equal."""
+        """Return how the exposed frames are combined at a frame.
+
+        Settings without effect have their defaults, so that two shutters that combine alike compare equal.
+        """
         if self.combine not in EXTREMES:
             return Combine(self.combine)
         if not self.use_threshold:
@@ -361,16 +416,17 @@ class Shutter:
 
 @dataclass(frozen=True)
 class Effect:
-    """The whole effect, except for its source.
+    """The whole effect, except for its footage.
 
     Attributes:
-        shutters: The first one is the default.
+        shutters: The first one is the default, which all pixels get if nothing is drawn.
         regions: Later regions lie over earlier ones, and all mattes lie over all scribbles.
-        options: Channel of frame_state.Options, without `edge_aware`, which has numeric keys.
+        options: Channel of frame_state.Options. Its `edge_aware` does not count: that has a channel here.
+        time: Channel of (source frame, whether the footage runs backward); its first frame is 1. None: the strip's own
+            timing counts.
+        edge_aware: Channel of Options.edge_aware.
         camera: A subject that shutters can follow.
-        lost: A warning that a recipe of an older version showed another picture, or None.
-        time: Channel of (source frame, whether it runs backward); the source's first frame is 1. None: the strip's
-            own timing counts.
+        lost: A warning that this recipe of an older version cannot look as it did, or None.
     """
 
     shutters: tuple[Shutter, ...]
@@ -385,7 +441,11 @@ class Effect:
     lost: EffectError | None = None
 
     def at(self, frame: float) -> FrameState:
-        """Return the effect's state at a frame. EffectError: no picture can be made of it."""
+        """Return the effect's state at a frame, without layers and motion, which state_at.py adds.
+
+        Raises:
+            EffectError: No picture can be made of the effect.
+        """
         if (name := self._one_too_many) is not None:
             raise EffectError(_TOO_MANY_POINTS, name=name, most=limits.MAX_POINTS)
         options = replace(self.options.at(frame), edge_aware=float(self.edge_aware.at(frame)))
@@ -401,14 +461,22 @@ class Effect:
         )
 
     def with_regions(self, regions: Sequence[Region | MatteRegion]) -> Effect:
-        """Return the effect with other regions, which shutters follow instead."""
+        """Return the effect with its regions replaced. Shutters that follow a region follow its replacement.
+
+        Args:
+            regions: The replacements, one for each region in the same order.
+        """
         new: dict[int, Subject] = {id(old): each for old, each in zip(self.regions, regions, strict=True)}
         followed = [each.follow and new.get(id(each.follow), each.follow) for each in self.shutters]
         shutters_ = tuple(replace(each, follow=follow) for each, follow in zip(self.shutters, followed, strict=True))
         return replace(self, shutters=shutters_, regions=tuple(regions))
 
     def for_picture(self, aspect: float) -> Effect:
-        """Return the effect of a recipe for a picture of this width / height."""
+        """Return a recipe's effect for pictures of one aspect, which recipes do not know and rotated strokes need.
+
+        Args:
+            aspect: The picture's width / height.
+        """
         regions = [
             replace(region, drawings=replace(region.drawings, aspect=aspect)) if region.drawings else region
             for region in self.regions
@@ -416,19 +484,23 @@ class Effect:
         return self.with_regions(regions)
 
     def layers_at(self, frame: float) -> list[Region | MatteRegion]:
-        """Return the visible layers at a frame, the farthest first."""
+        """Return the regions that are visible layers at a frame, the farthest first."""
         return [region for region in self.regions if region.layer and region.opacity.at(frame) > 0]
 
     def drawn_at(self, frame: float) -> list[scribbles.Shape]:
-        """Return all drawn shapes at a frame, including layers, in the order of the regions. EffectError: as `at`."""
+        """Return the shapes of all drawn regions at a frame, including layers, in the order of the regions.
+
+        Raises:
+            EffectError: Strokes are too far outside the picture.
+        """
         drawn = [region for region in self.regions if isinstance(region, Region | OutlineRegion | SubjectRegion)]
         return [region.at(frame) if isinstance(region, Region) else region.drawn_at(frame) for region in drawn]
 
     @cached_property
     def _one_too_many(self) -> str | None:
-        """The name of the first region that exceeds the limit of points, or None.
+        """The name of the first region with which the effect has more than limits.MAX_POINTS points, or None.
 
-        Layers and outlines count, too. Each region counts with its largest drawing.
+        Each region counts with its largest drawing. Layers and outlines count, too.
         """
         room = limits.MAX_POINTS
         for region in self.regions:
@@ -439,12 +511,25 @@ class Effect:
         return None
 
     def bars_at(self, index: int, frame: float) -> np.ndarray:
-        """Return the bars (L,) of a shutter at a frame. EffectError: no picture can be made of them."""
+        """Return the bars (L,) of the shutter with an index, at a frame.
+
+        Raises:
+            EffectError: No picture can be made of them (shutters.check_bars).
+        """
         bars = self.shutters[index].bars.at(frame, self.options.at(frame).interpolation)
         return self.checked(index, frame, bars)
 
     def checked(self, index: int, frame: float, bars: np.ndarray) -> np.ndarray:
-        """Return the given bars (L,) of a shutter. EffectError: no picture can be made of them."""
+        """Check bars (L,) and return them as float64.
+
+        Args:
+            index: The shutter's index, for the error's message.
+            frame: The frame of the bars, likewise.
+            bars: The bars.
+
+        Raises:
+            EffectError: No picture can be made of them (shutters.check_bars).
+        """
         try:
             return shutters.check_bars(bars)
         except shutters.ShutterError as error:

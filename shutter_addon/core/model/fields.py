@@ -22,20 +22,21 @@ Choice = tuple[str, str, str]  # identifier, label, description
 
 @dataclasses.dataclass(frozen=True)
 class Field:
-    """A property of an effect, a shutter, a region or the camera.
+    """A property of an effect, a shutter, a region or the camera: everything that its users derive from it.
 
     Attributes:
         default: The value of a new effect in Blender.
-        absent: The value of a recipe without the field, or MISSING if it is required.
+        absent: The value of a recipe without the field, or MISSING if recipes must have it.
         least, most: The range of a number; `most` of a text is its number of characters.
-        soft_most: The end of the slider.
+        soft_most: The largest value of the slider in Blender, below `most`. None: `most`.
         choices: The allowed words. The model and recipes write them in small letters.
         keyed, keyed_in_recipe: Whether F-curves and a recipe's keys can change it.
-        is_channel: Whether the model holds a keyframes.Channel.
-        blender, recipe: The names there; a recipe has no field "".
-        shown: Whether the panel shows it without further code, below the rest.
+        is_channel: Whether the model holds a keyframes.Channel instead of a plain value.
+        blender, recipe: Its names there. If `recipe` is "", recipes do not have it as a plain field.
+        shown: Whether the shutter's panel shows it below the other properties, which have code of their own.
         told: Whether recipes write it even if it equals `absent`.
-        subtype, context: Of Blender's property, and of the label's translation.
+        subtype, precision: Of Blender's property.
+        context: The translation context of the label.
     """
 
     label: str
@@ -59,7 +60,7 @@ class Field:
 
     @cached_property
     def words(self) -> dict[str, int | str]:
-        """The choices as the model has them, words or whole numbers, by identifier."""
+        """The model's values of `choices` by identifier: "over" for "OVER", the number 2 for "2"."""
         return {name: int(name) if name.isdigit() else name.lower() for name, *_ in self.choices}
 
 
@@ -68,33 +69,47 @@ MISSING = dataclasses.MISSING
 
 @dataclasses.dataclass(frozen=True)
 class Labelled:
-    """The texts of a property. Each method declares it as a field of a dataclass."""
+    """The label and the description of a property. Each method declares that property as a field of a dataclass.
+
+    The methods return a dataclasses.field. Its metadata has the attributes of Field, from which `fields_of` makes one.
+    """
 
     label: str
     description: str
 
     def number(self, *, default: float, **more: Any) -> Any:
-        """Declare a number that keys can change; the model holds a channel."""
+        """Declare a number that keys can change. The model holds a channel, constant by default.
+
+        Args:
+            default: Field.default.
+            more: Other attributes of Field.
+        """
         more = {"keyed": True, "is_channel": True, "keyed_in_recipe": True} | more
         return self.fixed(default=default, made=lambda: Constant(default), **more)
 
     def switch(self, *, default: bool = False, **more: Any) -> Any:
-        """Declare a boolean without keys."""
+        """Declare a boolean without keys. `more`: other attributes of Field."""
         return self.fixed(default=default, **more)
 
     def choice(self, choices: Sequence[Choice], *, default: str | int, **more: Any) -> Any:
-        """Declare a choice of one word, without keys."""
+        """Declare a choice of one word, without keys. `more`: other attributes of Field."""
         return self.fixed(default=default, choices=choices, **more)
 
     def fixed(self, *, default: Any, made: Callable[[], Any] | None = None, **more: Any) -> Any:
-        """Declare a whole number, a text or a color, without keys; `made` makes the model's value, not `default`."""
+        """Declare a whole number, a text or a color, without keys.
+
+        Args:
+            default: Field.default.
+            made: Makes the default value of the model. None: it is `default`.
+            more: Other attributes of Field.
+        """
         said = {"label": self.label, "description": self.description, "default": default, "absent": default} | more
         return dataclasses.field(default_factory=made or (lambda: default), metadata=said)
 
 
 @cache
 def fields_of(*kinds: type) -> dict[str, Field]:
-    """Return the Fields of classes, by attribute name."""
+    """Return the properties that dataclasses of the model declare, by attribute name."""
     said = {each.name: each.metadata for kind in kinds for each in dataclasses.fields(kind) if each.metadata}
     names: dict[str, dict[str, Any]] = {name: {"blender": name, "recipe": name} for name in said}
     return {name: Field(**names[name] | said[name]) for name in said}

@@ -1,4 +1,4 @@
-"""The effect's state at one frame, from which a picture is composed."""
+"""The state of an effect at one frame, as plain data: all that a picture needs besides the footage."""
 
 from __future__ import annotations
 
@@ -28,10 +28,11 @@ class Combine:
     """How the frames that a shutter exposes become one picture (core/pixels/compositor.py).
 
     Attributes:
-        by_luminance: Lightest and darkest only: choose a pixel's frame by luminance, not per channel.
-        threshold: Lightest and darkest only: luminance of linear light from which a frame leaves a trail (up to which,
-            for the darkest). None: every frame does.
-        softness: Range of luminance around the threshold over which trails fade in.
+        mode: The average, lightest, darkest or median of the frames.
+        by_luminance: For lightest and darkest: choose a pixel's frame by luminance, not for each color channel.
+        threshold: For lightest and darkest: the luminance of linear light above which a frame leaves a trail (below
+            which, for darkest); white is 1. None: every frame does.
+        softness: The range of luminance around the threshold in which trails fade in.
     """
 
     mode: Mode = "average"
@@ -46,14 +47,15 @@ EXTREMES = "lightest", "darkest"  # the modes that have a threshold
 
 @dataclass(frozen=True)
 class Options:
-    """How a window of frames becomes a picture.
+    """The options of an effect at a frame: which frames around the shown one count, and how they become a picture.
 
     Attributes:
-        window: L, its length in filmed frames. In a FrameState, the number of bars, `step` per filmed frame.
-        edge_aware: 0 to 1, how strongly diffusion stops at edges of the shown frame (core/pixels/conductances.py).
+        window: The length L of the window (the frames that can be exposed) in filmed frames. In a FrameState it counts
+            moments, `step` per filmed frame.
+        edge_aware: 0 to 1, how strictly scribbles stop at edges of the shown frame (core/pixels/conductances.py).
         step: Moments per filmed frame. "auto", which only an effect's options have, chooses by the footage.
-        slid: Frames by which the window is moved from its position (core/model/windows.py).
-        backward: Whether the source plays in reverse. A filmed frame is then the last of its moments.
+        slid: Frames by which the window was moved onward, to lie inside the shot (core/model/windows.py).
+        backward: Whether the footage plays backward. A filmed frame is then the last of its moments.
     """
 
     window: int = Labelled("Frames", "Number of source frames that a shutter can expose").fixed(
@@ -112,25 +114,26 @@ class Options:
 
     @property
     def shown(self) -> int:
-        """The index of the shown frame in the window."""
+        """The index of the shown frame in the window, in moments."""
         return self.before + (self.step - 1 if self.backward else 0)
 
     @property
     def reach(self) -> int:
-        """The larger number of filmed frames in the window on one side of the shown frame."""
+        """The largest distance of a filmed frame in the window from the shown one, in filmed frames."""
         before = self.before // self.step
         return max(before, self.filmed - 1 - before)
 
 
 @dataclass(frozen=True)
 class Following:
-    """The motion from the shown picture to the source's frames, for each shutter: z → turn · z + shift.
+    """Where exposures look in other source frames, as they follow a motion: one motion for each shutter and frame.
 
-    See motions.Similarity for coordinates.
+    A point z of the shown picture lies at turn · z + shift in another frame. motions.Similarity has the coordinates.
 
     Attributes:
         first: The source frame of the first row.
-        turns, shifts: (S, N) complex128, a row per source frame. 1 and 0 for shutters that follow no motion.
+        turns, shifts: complex128 (S, N): a row for each source frame from `first` on, a column for each shutter. 1 and
+            0 for shutters that follow nothing.
     """
 
     first: int
@@ -138,14 +141,15 @@ class Following:
     shifts: np.ndarray
 
     def at(self, frames: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-        """Return turns and shifts (L, N) at source frames (L,), clamped to the known frames."""
+        """Return turns and shifts (L, N) for source frames (L,). A frame without a row has those of the nearest row."""
         rows = np.clip(np.asarray(frames) - self.first, 0, len(self.turns) - 1)
         return self.turns[rows], self.shifts[rows]
 
     def between(self, start: int, end: int) -> tuple[complex, complex]:
-        """Return turn and shift of the first shutter from one source frame to another.
+        """Return the turn and shift of the first shutter's motion from one source frame to another.
 
-        They are rounded, so that they do not depend on the shown picture: ties between pixels would reveal it.
+        They are rounded, so that they do not depend on which frame is shown. Otherwise a point halfway between two
+        pixels could go to either.
         """
         (before, after), (from_, to) = (values[:, 0] for values in self.at([start, end]))
         turn = after / before
@@ -153,31 +157,34 @@ class Following:
 
     @property
     def key(self) -> tuple:
-        """A hashable that is equal for equal motions."""
+        """A hashable value that is equal for equal motions."""
         return self.first, self.turns.tobytes(), self.shifts.tobytes()
 
     def moving(self) -> np.ndarray:
-        """Return the indices of shutters that follow a motion."""
+        """Return the indices of shutters whose exposures move."""
         return np.flatnonzero((self.turns != 1).any(axis=0) | self.shifts.any(axis=0))
 
     def of(self, chosen: slice | Sequence[int]) -> Following | None:
-        """Return the motions of some shutters, or None if none of them moves."""
+        """Return the motions of the chosen shutters (by index), or None if none of them moves."""
         part = Following(self.first, self.turns[:, chosen], self.shifts[:, chosen])
         return part if part.moving().size else None
 
 
 @dataclass(frozen=True)
 class Layers:
-    """Regions that are exposed separately (core/pixels/layering.py), the farthest first, with mattes per source frame.
+    """Regions that are exposed by themselves in front of the rest (core/pixels/layering.py), and their mattes.
+
+    There are n layers, the farthest first. A drawn layer consists of strokes, any other has a matte.
 
     Attributes:
-        shutters: (n,) indices.
-        opacities: (n,) 0 to 1.
-        first: The first source frame with mattes.
-        scribbles: A state per source frame. Its coefficient 1 + i is the matte of drawn layer i; coefficient 0 belongs
-            to no layer. None where no layer is drawn.
-        mattes: Per source frame the mattes (n,) of layers; None for a drawn layer.
-        camera: The camera's motion, as of one shutter; None if unknown or still.
+        shutters: The index of each layer's shutter, (n,).
+        opacities: 0 to 1, (n,).
+        first: The first source frame for which mattes are known.
+        scribbles: A state for each source frame from `first` on, whose diffusion gives the mattes of drawn layers: its
+            coefficient 1 + i is the matte of layer i, coefficient 0 is what belongs to no layer. None without drawn
+            layers.
+        mattes: For each of these frames the mattes (n,) of the layers; None for a drawn layer.
+        camera: The camera's motion, as that of one shutter; None if it is unknown or still.
     """
 
     shutters: tuple[int, ...]
@@ -189,34 +196,35 @@ class Layers:
 
     @property
     def frames(self) -> range:
-        """The source frames with known mattes."""
+        """The source frames for which mattes are known."""
         return range(self.first, self.first + len(self.mattes))
 
     def key_at(self, frame: int) -> tuple:
-        """Return a hashable that is equal for equal mattes in a source frame."""
+        """Return a hashable value that is equal if all layers have equal mattes in a source frame."""
         place = frame - self.first
         drawn = self.scribbles[place]
         return self.opacities, self.mattes[place], drawn and drawn.key
 
     @cached_property
     def key(self) -> tuple:
-        """A hashable that is equal for layers that give the same picture of the same frames."""
+        """A hashable value that is equal for layers that give the same picture of the same frames."""
         camera = self.camera and self.camera.key
         return self.shutters, self.first, camera, tuple(map(self.key_at, self.frames))
 
 
 @dataclass(frozen=True)
 class FrameState:
-    """The effect at one frame.
+    """The effect at one frame: all that a picture depends on, besides the footage.
 
     Attributes:
-        bars: (N, L) float64, the weight of each frame of the window for each shutter; shutter 0 is the default.
-        shapes: Scribbles as they lie at this frame, later ones on top.
-        reference: The exposure (sum of bars) of full brightness if `exposure` is "weighted"; None: the default's.
-        following: The motion that exposures follow, or None.
+        options: Its options at this frame, with `step` as a number.
+        bars: (N, L) float64, how much each frame of the window contributes for each shutter; shutter 0 is the default.
+        shapes: Scribbles where they lie at this frame, later ones on top.
+        reference: The sum of bars that has full brightness if `exposure` is "weighted". None: that of shutter 0.
+        following: The motions that exposures follow, or None.
         mattes: Laid over the scribbles' coefficients, later ones on top.
-        layers: Regions in front of the rest, or None.
-        combines: How each shutter combines its frames; empty: all average.
+        layers: Regions that are exposed by themselves in front of the rest, or None.
+        combines: How each shutter combines its frames. Empty: all average.
     """
 
     options: Options
@@ -230,9 +238,10 @@ class FrameState:
 
     @property
     def gains(self) -> np.ndarray:
-        """The brightness (N,) of each shutter: 1, or exposure / reference for averages if `exposure` is "weighted".
+        """The factor (N,) for the brightness of each shutter.
 
-        It scales linear light, as an aperture would. Encoded values are decoded first.
+        It is 1. If `exposure` is "weighted", it is the sum of a shutter's bars over the reference, for shutters that
+        average. Factors scale linear light, as an aperture would; encoded values are decoded first.
         """
         exposures = self.bars.sum(axis=1)
         gains = np.ones_like(exposures)
@@ -243,7 +252,10 @@ class FrameState:
 
     @cached_property
     def open_span(self) -> tuple[int, int]:
-        """`shutters.open_span` of the bars, including the shown frame if a threshold needs it."""
+        """The index of the first frame of the window that any shutter exposes, and one past the last.
+
+        A threshold needs the shown frame, so this is included then.
+        """
         first, last = shutters.open_span(self.bars)
         if any(combine.threshold is not None for combine in self.combines):
             return min(first, self.options.shown), max(last, self.options.shown + 1)
@@ -251,7 +263,10 @@ class FrameState:
 
     @cached_property
     def groups(self) -> dict[Combine, tuple[int, ...]]:
-        """The shutters by how they combine frames; those of a group are displaced together."""
+        """The indices of shutters that combine frames in the same way, by that way.
+
+        Shutters of a group are interpolated with each other. The pictures of different groups are mixed.
+        """
         groups: dict[Combine, tuple[int, ...]] = {}
         for index, combine in enumerate(self.combines or (AVERAGE,) * len(self.bars)):
             groups[combine] = (*groups.get(combine, ()), index)
@@ -259,12 +274,12 @@ class FrameState:
 
     @property
     def averages(self) -> bool:
-        """Whether all shutters average."""
+        """Whether all shutters average their frames."""
         return set(self.groups) == {AVERAGE}
 
     @cached_property
     def key(self) -> tuple:
-        """A hashable that is equal for states that give the same picture of the same frames."""
+        """A hashable value that is equal for states that give the same picture of the same frames."""
         bars = self.bars.shape, self.bars.tobytes()
         following = self.following and self.following.key
         layers = self.layers and self.layers.key
@@ -272,13 +287,16 @@ class FrameState:
 
     @cached_property
     def shapes_key(self) -> tuple:
-        """A hashable that is equal for equal shapes."""
+        """A hashable value that is equal for equal scribbles."""
         return tuple(
             (s.shutter, s.kind, s.width, s.opacity, *(stroke.tobytes() for stroke in s.strokes)) for s in self.shapes
         )
 
     def in_blocks(self, aggregate: int) -> FrameState:
-        """Return the state with another block size, also for drawn layers."""
+        """Return the state with another Options.aggregate (the side of the blocks of pixels that share a shutter).
+
+        That of drawn layers changes as well.
+        """
         if aggregate == self.options.aggregate:
             return self
         layers = self.layers and replace(
@@ -287,7 +305,7 @@ class FrameState:
         return replace(self, options=replace(self.options, aggregate=aggregate), layers=layers)
 
     def of(self, chosen: Sequence[int]) -> FrameState:
-        """Return a state of some shutters, without scribbles and mattes."""
+        """Return the state of the chosen shutters (by index) alone, without scribbles, mattes and layers."""
         return FrameState(
             options=replace(self.options, edge_aware=0.0),
             bars=self.bars[list(chosen)],

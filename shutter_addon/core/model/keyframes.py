@@ -1,4 +1,4 @@
-"""Values over time: constant, keyed with eases, or sampled; and a shutter's bars from key to key."""
+"""Channels, which are values over time: constant, keyed with eases, sampled or computed. And a shutter's bars."""
 
 from __future__ import annotations
 
@@ -18,16 +18,26 @@ EASES: tuple[Ease, ...] = ("linear", "bezier", "constant")
 
 
 def eased(u: float, ease: Ease) -> float:
-    """Return the progress 0 to 1 through a span. "bezier" has flat handles of a third of the span: u²(3 − 2u)."""
+    """Return how far a value has changed from one key to the next, 0 to 1.
+
+    Args:
+        u: How much of the time between the two keys has passed, 0 to 1.
+        ease: "linear"; "constant", which jumps at the end; or "bezier", whose flat handles are a third of the span
+            long, which is u²(3 − 2u).
+    """
     if ease == "constant":
         return 0.0 if u < 1 else 1.0
     return u * u * (3 - 2 * u) if ease == "bezier" else u
 
 
 def span(frames: Sequence[float], frame: float) -> tuple[int, int, float]:
-    """Return the indices of the keys around `frame` in ascending `frames`, and the share 0 to 1 between them.
+    """Return the indices of the keys before and after a frame, and the share 0 to 1 of the way between them.
 
     Outside the keys and on a key, both indices are the nearest key's.
+
+    Args:
+        frames: The keys' frames, ascending.
+        frame: The frame.
     """
     after = bisect_right(frames, frame)
     if after == 0:
@@ -39,7 +49,14 @@ def span(frames: Sequence[float], frame: float) -> tuple[int, int, float]:
 
 
 def between_bars(first: ArrayLike, second: ArrayLike, u: float, interpolation: str = "displacement") -> np.ndarray:
-    """Return bars (L,) a share u of the way between two shutters: by displacement, or linearly per bar ("value")."""
+    """Return bars (L,) between those of two keys.
+
+    Args:
+        first: The bars (L,) of the first key.
+        second: The bars (L,) of the second key.
+        u: The share of the way from the first to the second, 0 to 1.
+        interpolation: "displacement" moves the bars' light through the frames, "value" fades each bar by itself.
+    """
     before, after = np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64)
     if u <= 0:
         return before
@@ -54,12 +71,16 @@ class Channel(Protocol):
     """A value over time."""
 
     def at(self, frame: float) -> Any:
-        """Return the value at a frame. UserError: the stored value is invalid."""
+        """Return the value at a frame.
+
+        Raises:
+            UserError: The stored value is invalid.
+        """
 
 
 @dataclass(frozen=True)
 class Constant:
-    """The same value at every frame. A UserError as the value is raised by `at`."""
+    """A channel with the same value at every frame. If the value is a UserError, `at` raises it."""
 
     value: Any
 
@@ -69,7 +90,13 @@ class Constant:
 
 @dataclass(frozen=True)
 class Keys:
-    """Numbers or arrays at ascending frames, interpolated with the ease of each span."""
+    """A channel of numbers or arrays at keys, interpolated in between.
+
+    Attributes:
+        frames: The keys' frames, ascending.
+        values: The value at each key.
+        eases: The ease from each key to the next.
+    """
 
     frames: tuple[float, ...]
     values: tuple
@@ -83,32 +110,43 @@ class Keys:
 
 @dataclass(frozen=True)
 class Samples:
-    """Values at the frames where they were sampled. A UserError among them is raised by `at`.
+    """A channel of values that were read at some frames in advance, such as those of an F-curve of Blender.
 
     Attributes:
-        keys: Frames and eases of the sampled curve's keys, ascending; empty if it had none.
+        values: The value at each of these frames. If it is a UserError, `at` raises it.
+        keys: Frames and eases of the curve's keys, ascending; empty if it had none.
     """
 
     values: dict[float, Any]
     keys: tuple[tuple[float, Ease], ...] = ()
 
     def at(self, frame: float) -> Any:
-        """Return the value at a sampled frame. KeyError: it was not sampled."""
+        """Return the value at a sampled frame.
+
+        Raises:
+            KeyError: The frame was not sampled.
+            UserError: The value is invalid.
+        """
         return _given(self.values[frame])
 
 
 @dataclass(frozen=True)
 class Computed:
-    """A value that a function computes."""
+    """A channel whose value at a frame is what the function `at` returns."""
 
     at: Callable[[float], Any]
 
 
 @dataclass(frozen=True)
 class SourceTime:
-    """A channel of (source frame, whether it runs backward), from a channel of numbers.
+    """The channel of Effect.time: (source frame, whether the footage runs backward), from the keys of the source frame.
 
-    While time stands still, the direction is the last movement's towards one of the `keys`, or forward after jumps.
+    While the source frame stands still, the direction is that of the last movement towards one of its keys. Without
+    any, it is forward.
+
+    Attributes:
+        numbers: Channel of the source frame; the first one is 1.
+        keys: Frames and eases of its keys, ascending.
     """
 
     numbers: Channel
@@ -132,9 +170,9 @@ class Bars:
     """A shutter's bars (L,) float64 over time.
 
     Attributes:
-        channel: The bars where they are not displaced: on keys, outside of them, and between keys by value.
+        channel: Channel of the bars. It counts at keys, before the first and after the last, and where bars fade.
         keys: Frames and eases of the keys, ascending; without keys, only `channel` counts.
-        share: Channel of the share 0 to 1 between the keys around a frame; None: the eases determine it.
+        share: Channel of the share 0 to 1 of the way between the keys around a frame. None: the eases determine it.
     """
 
     channel: Channel
@@ -146,11 +184,14 @@ class Bars:
     ) -> np.ndarray:
         """Return the bars at a frame.
 
-        Between keys they are displaced (paper §3.4.1, over time). `channel` counts if interpolation is "value", and
-        before and after a closed shutter, which cannot be displaced.
+        Between keys they are interpolated by displacement (paper §3.4.1, over time). If one of the keys around the
+        frame has a closed shutter, which cannot be displaced, they fade as with "value".
 
         Args:
-            spread: Turns bars of filmed frames into bars of moments, so that displacement passes through moments.
+            frame: The frame.
+            interpolation: Options.interpolation; with "value" bars fade by themselves between keys.
+            spread: Turns bars of filmed frames into bars of moments (Shutter.spread), so that displacement passes
+                through these.
         """
         if not self.keys:
             return spread(self.channel.at(frame))
@@ -169,12 +210,19 @@ class Bars:
 
 
 def eased_span(frames: Sequence[float], eases: Sequence[Ease], frame: float) -> tuple[int, int, float]:
-    """Return `span` with the eased share; a key's ease is that of the span after it."""
+    """Return `span`, with the share after easing.
+
+    Args:
+        frames: The keys' frames, ascending.
+        eases: The ease from each key to the next.
+        frame: The frame.
+    """
     before, after, share = span(frames, frame)
     return before, after, eased(share, eases[before])
 
 
 def _given(value: Any) -> Any:
+    """Return the value of a channel, or raise it if it is a UserError."""
     if isinstance(value, UserError):
         raise value.with_traceback(None)  # a traceback would grow with every raise
     return value

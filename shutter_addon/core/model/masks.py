@@ -1,8 +1,8 @@
-"""Blender's masks: their data at one frame, and their pictures as Blender's Mask strip shows them.
+"""Blender's masks: their data at one frame, and their values for each pixel, as Blender's Mask strip shows them.
 
 Mask space is a square around the picture, as large as the picture's larger side and centred on it: x to the right and y
 up, from 0 to 1. Outlines are polygons in fractions of the picture: x to the right and y up from the lower left corner,
-from 0 to 1. Their pictures have the lowest row first.
+from 0 to 1. Arrays have the picture's lowest row first, unless stated otherwise.
 """
 
 from __future__ import annotations
@@ -48,13 +48,15 @@ _BLENDS: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
 
 @dataclass(frozen=True)
 class MaskSpline:
-    """A spline with its handles, in mask space; tuples, so that it is hashable.
+    """A spline of a mask with its handles, in mask space. It consists of tuples, so that it is hashable.
 
     Attributes:
         points: Left handle, point and right handle, ((x, y), (x, y), (x, y)) each.
         weights: The width of the feather at each point.
-        feathers: For each point, the feather points ((u, factor), …) of the segment that follows it, u ascending. The
-            factors multiply the points' weights.
+        feathers: For each point, the feather points ((u, factor), …) of the segment that follows it, u ascending from 0
+            to 1. The factors multiply the points' weights.
+        cyclic: Whether the spline is closed.
+        weight_interpolation: How the feather's width changes from point to point: "EASE" or "LINEAR".
     """
 
     points: tuple[tuple[tuple[float, float], ...], ...]
@@ -66,7 +68,7 @@ class MaskSpline:
 
 @dataclass(frozen=True)
 class MaskLayer:
-    """A layer, with the values of Blender's MaskLayer."""
+    """A layer of a mask: its splines, and how they are filled and blended, with the values of Blender's MaskLayer."""
 
     splines: tuple[MaskSpline, ...]
     alpha: float = 1.0
@@ -79,12 +81,12 @@ class MaskLayer:
 
 @dataclass(frozen=True)
 class MaskShape:
-    """A mask at one frame: the rendered layers, the lowest first."""
+    """A mask at one frame: those of its layers that are rendered, the lowest first."""
 
     layers: tuple[MaskLayer, ...]
 
     def values(self, width: int, height: int) -> np.ndarray:
-        """Return the mask's coverage of a picture: (height, width) float32, 0 to 1, the top row first."""
+        """Return the mask's values for a picture of this size: (height, width) float32, 0 to 1, the top row first."""
         value = np.zeros((height, width), np.float32)
         for layer in self.layers:
             value = _blend(layer, value, _layer_value(layer, width, height))
@@ -92,7 +94,7 @@ class MaskShape:
 
 
 def _blend(layer: MaskLayer, below: np.ndarray, value: np.ndarray) -> np.ndarray:
-    """Blend a layer's value (h, w) over the layers below."""
+    """Return a layer's values (h, w) blended with those of the layers below, 0 to 1."""
     alpha = np.float32(layer.alpha)
     if layer.blend != "REPLACE" and alpha != 1:
         value = value * alpha
@@ -103,7 +105,7 @@ def _blend(layer: MaskLayer, below: np.ndarray, value: np.ndarray) -> np.ndarray
 
 
 def _layer_value(layer: MaskLayer, width: int, height: int) -> np.ndarray:
-    """Return the coverage of a layer's splines: (height, width) float32, the lowest row first."""
+    """Return the values of one layer, with filled splines and their feathers: (height, width) float32, 0 to 1."""
     value = np.zeros((height, width), np.float32)
     outlined = [_outlines(spline, width, height) for spline in layer.splines if len(spline.points) > 1]
     if not outlined or layer.alpha == 0:
@@ -114,7 +116,7 @@ def _layer_value(layer: MaskLayer, width: int, height: int) -> np.ndarray:
 
 
 def _outlines(spline: MaskSpline, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the outlines of a spline and of its feather, (n, 2) float64 each, point by point.
+    """Return the polygons (n, 2) float64 of a spline and of its feather's outer edge, point by point.
 
     A feather is at least a pixel wide, which is the only anti-aliasing.
     """
@@ -129,7 +131,16 @@ def _outlines(spline: MaskSpline, width: int, height: int) -> tuple[np.ndarray, 
 
 
 def _steps(spline: MaskSpline, points: np.ndarray, weights: np.ndarray, larger: int) -> int:
-    """Return a segment's number of points: one in four pixels of the longest segment, more for changing feathers."""
+    """Return into how many pieces each segment of a spline is divided: a piece for every 4 pixels of the longest one.
+
+    There are more pieces where the feather's width changes quickly.
+
+    Args:
+        spline: The spline.
+        points: Its points and handles, (n, 3, 2) in mask space.
+        weights: The feather's width (n,) at the points.
+        larger: The picture's larger side in pixels.
+    """
     following = np.roll(points, -1, axis=0)
     hull = np.stack([points[:, 1], points[:, 2], following[:, 0], following[:, 1]], axis=1)
     lengths = np.linalg.norm(np.diff(hull, axis=1), axis=2).sum(axis=1)  # of segments, along their handles
@@ -143,14 +154,23 @@ def _steps(spline: MaskSpline, points: np.ndarray, weights: np.ndarray, larger: 
 
 
 def _positions(spline: MaskSpline, count: int, steps: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return segments (n,) and u (n,), 0 to 1, of the outline's points on a spline of `count` points."""
+    """Return where the points of a spline's polygon lie on it: segment numbers (n,), and u (n,), 0 to 1 along each.
+
+    Args:
+        spline: The spline.
+        count: The number of its points.
+        steps: The number of pieces of each segment.
+    """
     segments = count if spline.cyclic else count - 1
     segment, u = np.repeat(np.arange(segments), steps), np.tile(np.arange(steps) / steps, segments)
     return (segment, u) if spline.cyclic else (np.append(segment, segments - 1), np.append(u, 1.0))
 
 
 def _at(spline: MaskSpline, points: np.ndarray, segment: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """Return points (n, 2) of a spline; beyond the end of an open one, its last point."""
+    """Return the points (n, 2) of a spline at places `u` (n,), 0 to 1, of segments (n,).
+
+    Past the end of an open spline, it is the last point.
+    """
     this, following = points[segment % len(points)], points[(segment + 1) % len(points)]
     a, b, c, d = this[:, 1], this[:, 2], following[:, 0], following[:, 1]
     u, v = u[:, None], 1 - u[:, None]
@@ -161,7 +181,7 @@ def _at(spline: MaskSpline, points: np.ndarray, segment: np.ndarray, u: np.ndarr
 def _offset(
     spline: MaskSpline, points: np.ndarray, weights: np.ndarray, segment: np.ndarray, u: np.ndarray, edge: np.ndarray
 ) -> np.ndarray:
-    """Return the feather's outline (n, 2), at right angles to the spline."""
+    """Return the feather's outer edge (n, 2): the spline's polygon `edge`, moved outward by the feather's width."""
     before, after = u - _REACH < 0, u + _REACH > 1
     last = _at(spline, points, segment - before, u - _REACH + before)
     following = _at(spline, points, segment + after, u + _REACH - after)
@@ -174,7 +194,10 @@ def _offset(
 
 
 def _widths(spline: MaskSpline, weights: np.ndarray, segment: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """Return the feather's width (n,) in mask space, eased or linear between points and feather points."""
+    """Return the feather's width (n,) in mask space at places `u` (n,), 0 to 1, of segments (n,).
+
+    Between the spline's points and feather points it is interpolated, eased or linearly.
+    """
     result = np.empty(len(u))
     for index, feather in enumerate(spline.feathers):
         here = segment == index
@@ -191,7 +214,14 @@ def _widths(spline: MaskSpline, weights: np.ndarray, segment: np.ndarray, u: np.
 
 
 def _pixel_wide(edge: np.ndarray, feather: np.ndarray, pixel: float) -> np.ndarray:
-    """Move the feather's outline to at least a pixel from the edge, along the previous point's normal as in Blender."""
+    """Move points of the feather's outer edge that are too near to the spline's polygon.
+
+    Args:
+        edge: The spline's polygon (n, 2).
+        feather: The feather's outer edge (n, 2).
+        pixel: The least distance, in fractions of the picture. Points move along the previous point's normal, as in
+            Blender.
+    """
     steps = _normalized(np.roll(edge, 1, axis=0) - edge)
     along = _normalized(np.roll(steps, 1, axis=0) + steps)
     narrow = np.sum((feather - edge) ** 2, axis=1) < pixel * pixel
@@ -212,8 +242,11 @@ def _fill(value: np.ndarray, polygons: list[np.ndarray], solver: str, holes: boo
     """Set the pixels of `value` (h, w) inside polygons (n, 2) to 1.
 
     Args:
-        holes: Combine the polygons: "CDT" (Blender's solver) sums their windings, "SWEEP_LINE" is even-odd. Otherwise
-            each polygon is filled separately.
+        value: The pixels.
+        polygons: In fractions of the picture.
+        solver: How polygons are combined if there are holes, as MaskLayer.fill_solver: "CDT" sums their windings,
+            "SWEEP_LINE" is even-odd.
+        holes: Whether polygons inside others make holes. Otherwise each polygon is filled by itself.
     """
     in_pixels = [polygon * value.shape[::-1] for polygon in polygons]
     for group in [in_pixels] if holes else [[polygon] for polygon in in_pixels]:
@@ -221,10 +254,13 @@ def _fill(value: np.ndarray, polygons: list[np.ndarray], solver: str, holes: boo
 
 
 def feather(value: np.ndarray, quads: np.ndarray, falloff: Callable[[np.ndarray], np.ndarray]) -> None:
-    """Raise the pixels of `value` (h, w) that quads (n, 4, 2) cover to the quads' values.
+    """Raise the pixels of `value` (h, w) that quads cover to the quads' values.
 
-    The value is 1 at the first two corners and 0 at the last two, interpolated by mean value coordinates, then passed
-    through `falloff`.
+    Args:
+        value: The pixels, with values 0 to 1.
+        quads: Corners (n, 4, 2) in fractions of the picture. The value is 1 at the first two corners and 0 at the last
+            two, and interpolated in between by mean value coordinates.
+        falloff: Converts interpolated values (0 to 1) to those of the pixels.
     """
     height, width = value.shape
     flat = value.reshape(-1)
@@ -244,10 +280,13 @@ def feather(value: np.ndarray, quads: np.ndarray, falloff: Callable[[np.ndarray]
 
 
 def _quad_rows(quads: np.ndarray, width: int, height: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return the pixels of quads (n, 4, 2) by rows: quad, row, first pixel and end, (m,) each.
+    """Return the pixels that quads (n, 4, 2) cover, as spans of rows.
 
     A quad is divided into triangles between its first and third corner, as in Blender. That matters for quads that are
     not convex.
+
+    Returns:
+        For each span the quad's index, the row, the first pixel and one past the last, (m,) each.
     """
     sides = np.roll(quads, -1, axis=1) - quads
     following = np.roll(sides, -1, axis=1)
@@ -275,7 +314,7 @@ def _nearness(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Return how near points are to the first two corners of quads, 0 to 1 (n,), by mean value coordinates.
 
     Args:
-        x, y: (4, n), from the points to the corners.
+        x, y: (4, n), the distances along each axis from the points to the four corners of their quads.
     """
     lengths = np.sqrt(x * x + y * y)
     tangents = []

@@ -1,4 +1,4 @@
-"""Mattes: coefficients for every pixel from a file, a mask or a ramp instead of scribbles.
+"""Mattes: how much of a shutter each pixel gets, from a file, a mask, a ramp or an outline instead of scribbles.
 
 They are laid over the scribbles' coefficients in the order of the regions, later ones on top.
 """
@@ -29,12 +29,14 @@ _SMALLEST = 1e-6
 
 @dataclass(frozen=True)
 class FileFrame:
-    """A frame of a file.
+    """The frame of a matte file that a matte shows.
 
     Attributes:
-        offset: From the source's shown filmed frame to the matte's, both counted from 0.
-        time: Frames since the one that shows frame `offset`; replaces the source's frame.
-        timing: A strip of the edit, which shows the file at the timeline frame `time`.
+        file: The file.
+        offset: The number of frames that the matte plays ahead of the footage (or of `time`).
+        time: Timeline frames since the one that shows the file's frame `offset`. None: the matte follows the footage,
+            and shows the frame with the number of the footage's filmed frame plus `offset`.
+        timing: The timing of a strip that shows the file; `time` is then a timeline frame.
     """
 
     file: SourceFile
@@ -43,10 +45,11 @@ class FileFrame:
     timing: StripTiming | None = None
 
     def index(self, source: FrameSource, shown: int) -> int:
-        """Return the index in the opened file while the source shows the filmed frame `shown`; it may be out of range.
+        """Return the index of the frame in the opened file; it may be out of range.
 
-        Raises:
-            EffectError: The strip's retiming is unknown.
+        Args:
+            source: The opened file.
+            shown: The filmed frame of the footage that is shown, from 0.
         """
         if self.time is None:
             return shown + self.offset
@@ -57,11 +60,14 @@ class FileFrame:
 
 @dataclass(frozen=True)
 class FileFrames:
-    """A channel of a file's frames. By default they belong to the source's, `offset` frames ahead.
+    """A channel of the frames of a matte file. By default they follow those of the footage, `offset` frames ahead.
 
     Attributes:
-        first: The timeline frame that shows the file's frame `offset`; the file then plays along the timeline.
-        timing: A strip of the edit that shows the file.
+        file: The file.
+        offset: The number of frames that the matte plays ahead.
+        first: The timeline frame that shows the file's frame `offset`; the file then plays along the timeline. None: it
+            follows the footage.
+        timing: The timing of a strip that shows the file. `offset` and `first` then do not count.
     """
 
     file: SourceFile
@@ -70,7 +76,7 @@ class FileFrames:
     timing: StripTiming | None = None
 
     def at(self, frame: float) -> FileFrame:
-        """Return the frame at a timeline frame."""
+        """Return which frame of the file a timeline frame shows."""
         if self.timing is not None:
             return FileFrame(file=self.file, offset=0, time=frame, timing=self.timing)
         return FileFrame(file=self.file, offset=self.offset, time=None if self.first is None else frame - self.first)
@@ -78,12 +84,13 @@ class FileFrames:
 
 @dataclass(frozen=True)
 class Ramp:
-    """Values from 0 to 1 across the picture.
+    """A gradient of values from 0 to 1 across the picture.
 
     A linear ramp goes from left to right; at any rotation, the outermost corners are 0 and 1. A radial one goes from
     the centre to the farthest corner. An angle goes once around the centre, clockwise from the top.
 
     Attributes:
+        kind: Its shape.
         placed: Where it lies, turned and scaled about the picture's centre.
     """
 
@@ -91,7 +98,7 @@ class Ramp:
     placed: Placement = Placement()
 
     def values(self, width: int, height: int) -> np.ndarray:
-        """Return (height, width) float32, 0 to 1, top row first."""
+        """Return the ramp for a picture of this size in pixels: (height, width) float32, 0 to 1, top row first."""
         scale = max(abs(self.placed.scale), _SMALLEST)
         x = np.arange(width) + 0.5 - width * (0.5 + self.placed.location[0])
         y = height * (0.5 - self.placed.location[1]) - (np.arange(height)[:, None] + 0.5)
@@ -109,12 +116,12 @@ class Ramp:
 
 @dataclass(frozen=True)
 class Outline:
-    """A matte inside closed curves (core/model/outlines.py)."""
+    """A matte that is 1 inside closed curves and 0 outside (core/model/outlines.py)."""
 
     curves: Curves
 
     def values(self, width: int, height: int) -> np.ndarray:
-        """Return (height, width) float32, 0 to 1, top row first."""
+        """Return the matte for a picture of this size in pixels: (height, width) float32, 0 to 1, top row first."""
         return coverage(self.curves, width, height)
 
 
@@ -126,11 +133,13 @@ class Matte:
     """A matte at one frame.
 
     Attributes:
-        shutter: Index of the shutter whose coefficients the values are.
+        shutter: The index of the shutter that pixels get in proportion to the matte's values.
+        content: What gives the values.
+        blend: "over" leaves the rest to the regions beneath. "add" takes only from the default shutter, so that mattes
+            that add up to 1 can be side by side.
         opacity: 0 to 1, a factor after inversion.
-        feather: The width of a hard edge, as a fraction of the picture's height.
-        blend: "over" leaves the rest to what is beneath. "add" takes only from the default shutter, so that mattes that
-            add up to 1 stand side by side.
+        feather: The width to which hard edges are blurred, as a fraction of the picture's height.
+        invert: Whether each value v becomes 1 − v.
     """
 
     shutter: int
@@ -142,30 +151,39 @@ class Matte:
 
 
 class MatteReader(Protocol):
-    """A reader of mattes' values, which keeps files open and the last values of each."""
+    """Reads the values of mattes for pictures of one size. It keeps files open, and the last values in memory."""
 
     def values(self, mattes: tuple[Matte, ...], index: int, block: int) -> list[tuple[Hashable, np.ndarray]]:
-        """Return for each matte a key that is equal for equal values, and the values at a frame of the source.
+        """Return the values of mattes in the shown frame, each with a key that is equal for equal values.
 
-        Values are (h, w) float32, 0 to 1, per pixel or block of block × block pixels, without the opacity.
+        Args:
+            mattes: The mattes.
+            index: The shown source frame.
+            block: The side of the blocks of pixels that share a value.
+
+        Returns:
+            (key, values) for each matte: (h, w) float32, 0 to 1, without the opacity.
 
         Raises:
-            UserError: They cannot be made.
+            UserError: A file cannot be read.
         """
 
     def another(self) -> MatteReader:
-        """Return a new reader for the same pictures."""
+        """Return a new reader for the same pictures, with files of its own."""
 
     def close(self) -> None:
-        """Close the files. They are reopened when needed."""
+        """Close the files. They are opened again when needed."""
 
 
 def blended(coefficients: np.ndarray, mattes: tuple[Matte, ...], values: Sequence[np.ndarray]) -> np.ndarray:
-    """Lay mattes over coefficients, Σ = 1: c ← (1 − m) c + m e for the matte's shutter e.
+    """Return coefficients (N, h, w) with mattes laid over them, one after another.
+
+    A matte with value m gives the shutter e its share: c ← (1 − m) c + m e. The sum of a pixel's coefficients stays 1.
 
     Args:
         coefficients: (N, h, w), or (N, 1, 1) if they are the same everywhere.
-        values: (h, w) of each matte, 0 to 1.
+        mattes: The mattes, the lowest first.
+        values: (h, w) of each matte, 0 to 1, without its opacity.
     """
     result = np.array(np.broadcast_to(coefficients, (len(coefficients), *np.shape(values[0]))))
     for matte, value in zip(mattes, values, strict=True):

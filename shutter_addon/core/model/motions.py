@@ -1,4 +1,4 @@
-"""The motion of regions: placements, motions of the picture, and which keys are needed to describe them."""
+"""Motions of regions and of the picture, and the keys that describe them."""
 
 from __future__ import annotations
 
@@ -26,11 +26,12 @@ _CORNER = 0.5 + 0.5j
 
 @dataclass(frozen=True)
 class Placement:
-    """A region's keyed numbers at a frame, which act about its shape's centre (see scribbles.transform).
+    """Where the keys of a region or of the camera put it at a frame, about its centre (see scribbles.transform).
 
     Attributes:
         location: x, y in fractions of the picture, y up.
         rotation: Degrees counter-clockwise.
+        scale: A factor.
     """
 
     location: tuple[float, float] = (0.0, 0.0)
@@ -43,7 +44,7 @@ Placements = Mapping[int, Placement]  # by frame
 
 @dataclass(frozen=True)
 class Similarity:
-    """A motion of the picture that turns, scales and shifts it: z → turn·z + shift.
+    """A motion of the picture that turns, scales and shifts it: a point z goes to turn · z + shift.
 
     z = x + iy in pixels, y down. Whole numbers are the middles of pixels.
     """
@@ -52,7 +53,7 @@ class Similarity:
     shift: complex = 0j
 
     def __call__(self, points: Points) -> Points:
-        """Return where points go."""
+        """Return where points, x + iy, go."""
         return self.turn * points + self.shift
 
     def after(self, first: Similarity) -> Similarity:
@@ -60,11 +61,12 @@ class Similarity:
         return Similarity(self.turn * first.turn, self(first.shift))
 
     def inverse(self) -> Similarity:
+        """Return the motion that takes points back."""
         return Similarity(1 / self.turn, -self.shift / self.turn)
 
 
 def centre(strokes: Iterable) -> np.ndarray:
-    """Return the centre (2,) of the strokes' common bounding box, about which they scale and turn."""
+    """Return the centre (2,) of the bounding box of all strokes, about which they scale and turn."""
     points = _points(strokes)
     return (points.min(axis=0) + points.max(axis=0)) / 2
 
@@ -74,37 +76,40 @@ PICTURE = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
 
 
 def corners(strokes: Iterable) -> np.ndarray:
-    """Return the corners (4, 2) of the strokes' common bounding box."""
+    """Return the corners (4, 2) of the bounding box of all strokes, counter-clockwise from the lower left one."""
     points = _points(strokes)
     (left, bottom), (right, top) = points.min(axis=0), points.max(axis=0)
     return np.array([(left, bottom), (right, bottom), (right, top), (left, top)])
 
 
 def offsets(strokes: Iterable) -> np.ndarray:
-    """Return the strokes' points (n, 2) relative to their centre, in fractions of the picture."""
+    """Return all points (n, 2) of strokes relative to the strokes' common centre, in fractions of the picture."""
     return _points(strokes) - centre(strokes)
 
 
 def _points(strokes: Iterable) -> np.ndarray:
+    """Return the points (n, 2) of all strokes in one array."""
     return np.concatenate([np.asarray(stroke, dtype=np.float64) for stroke in strokes])
 
 
 def pixel(place: Sequence[float] | np.ndarray, size: Size) -> complex:
-    """Convert fractions of the picture, y up, to pixels as in Similarity."""
+    """Convert a place in fractions of the picture (x, y up) to pixels x + iy (y down), as in Similarity."""
     return complex(place[0] * size[0], (1 - place[1]) * size[1]) - _CORNER
 
 
 def fractions(pixel: complex, size: Size) -> tuple[float, float]:
-    """Convert pixels as in Similarity to fractions of the picture, y up."""
+    """Convert a place in pixels x + iy (y down), as in Similarity, to fractions of the picture (x, y up)."""
     corner = pixel + _CORNER
     return corner.real / size[0], 1 - corner.imag / size[1]
 
 
 def carried(placement: Placement, motion: Similarity, before: np.ndarray, after: np.ndarray, size: Size) -> Placement:
-    """Return the placement of a shape after a motion of the picture.
+    """Return the placement with which a region goes along with a motion of the picture, such as a tracked one.
 
     Args:
-        before, after: Centres (2,) of the drawn shape at the motion's start and end, in fractions.
+        placement: The region's placement at the motion's start.
+        motion: The motion.
+        before, after: Centres (2,) of the drawn, unplaced shape at the motion's start and end, in fractions.
         size: Of the picture in which the motion is measured.
     """
     x, y = fractions(motion(pixel(np.add(before, placement.location), size)), size)
@@ -116,7 +121,13 @@ def carried(placement: Placement, motion: Similarity, before: np.ndarray, after:
 def motion_between(
     first: Placement, second: Placement, before: np.ndarray, after: np.ndarray, size: Size
 ) -> Similarity:
-    """Return the motion of the picture that takes a shape from one placement to another; the inverse of `carried`."""
+    """Return the motion of the picture that takes a shape from one placement to another; the inverse of `carried`.
+
+    Args:
+        first, second: The placements.
+        before, after: Centres (2,) of the drawn, unplaced shape at the two placements, in fractions of the picture.
+        size: Of the picture.
+    """
     angle = math.radians(first.rotation - second.rotation)
     turn = cmath.rect(second.scale / first.scale, angle)
     start, end = (pixel(np.add(*each), size) for each in ((before, first.location), (after, second.location)))
@@ -124,7 +135,10 @@ def motion_between(
 
 
 def unwound(placement: Placement, near: Placement) -> Placement:
-    """Return the placement with a rotation within half a turn of another's, so that keys between them do not spin."""
+    """Return the placement with full turns added to its rotation until it is within half a turn of `near`'s rotation.
+
+    Otherwise linear keys between the two placements would spin.
+    """
     turns = round((near.rotation - placement.rotation) / 360)
     return replace(placement, rotation=placement.rotation + 360 * turns)
 
@@ -136,28 +150,30 @@ def between(first: Placement, second: Placement, share: float) -> Placement:
 
 
 def only(placement: Placement, motion: Motion) -> Placement:
-    """Return the part of a placement that counts for a motion."""
+    """Return a placement with only what counts for a motion: its location, also its rotation, or also its scale."""
     rotation = 0.0 if motion == "location" else placement.rotation
     return Placement(placement.location, rotation, placement.scale if motion == "scale" else 1.0)
 
 
 def averaged(placements: Sequence[Placement], weights: np.ndarray) -> Placement:
-    """Return the mean of placements, each number by itself, with weights (n,), Σ = 1."""
+    """Return the mean of n placements, each number by itself, with weights (n,) whose sum is 1."""
     return _placement(weights @ as_array(placements))
 
 
 def thinned(
     placements: Placements, points: np.ndarray, size: Size, kept: Collection[float] = (), tolerance: float = 1.0
 ) -> list[int]:
-    """Return the frames, ascending, whose keys describe the motion.
+    """Return the frames, ascending, at which keys suffice to describe a motion of a shape.
 
-    With linear eases between them, no point of the shape is off by more than the tolerance. A span that is off is split
-    at its worst frame (Ramer, Douglas, Peucker).
+    With linear eases between these keys, no point of the shape is off by more than the tolerance. A span that is off is
+    split at its worst frame (Ramer, Douglas, Peucker).
 
     Args:
+        placements: The shape's placement at each frame.
         points: (n, 2) of the shape, from `offsets`.
         size: Of the picture in whose pixels the tolerance is measured.
         kept: Frames that always keep their keys.
+        tolerance: In pixels.
     """
     frames = sorted(placements)
     if len(frames) < 3:
@@ -183,17 +199,28 @@ def thinned(
 
 
 def as_array(placements: Sequence[Placement]) -> np.ndarray:
-    """Return location, rotation and scale as an array (n, 4)."""
+    """Return placements as an array (n, 4): location x and y, rotation, scale."""
     return np.array([(*p.location, p.rotation, p.scale) for p in placements], dtype=np.float64)
 
 
 def _placement(numbers: np.ndarray) -> Placement:
+    """Return the placement for numbers (4,) as from `as_array`."""
     x, y, rotation, scale = numbers.tolist()
     return Placement((x, y), rotation, scale)
 
 
 def _distances(frames: np.ndarray, numbers: np.ndarray, points: np.ndarray, size: Size) -> np.ndarray:
-    """Return by how many pixels a shape's points are off at most, at each frame, with keys only at the ends."""
+    """Return how far a shape's points are off at each frame if only the first and last frames have keys.
+
+    Args:
+        frames: (f,).
+        numbers: Placements (f, 4), as from `as_array`.
+        points: Of the shape, x + iy in pixels relative to its centre.
+        size: Of the picture.
+
+    Returns:
+        The largest distance of any point at each frame, (f,) in pixels.
+    """
     share = ((frames - frames[0]) / (frames[-1] - frames[0]))[:, None]
     straight = (1 - share) * numbers[0] + share * numbers[-1]
     (x, y), (turn, other) = ((numbers - straight)[:, :2] * size).T, (_turns(numbers), _turns(straight))
@@ -201,4 +228,5 @@ def _distances(frames: np.ndarray, numbers: np.ndarray, points: np.ndarray, size
 
 
 def _turns(numbers: np.ndarray) -> np.ndarray:
+    """Return the rotation and scale of placements (n, 4) as complex factors (n,)."""
     return numbers[:, 3] * np.exp(1j * np.radians(numbers[:, 2]))

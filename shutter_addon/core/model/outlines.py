@@ -1,4 +1,4 @@
-"""Outlines: closed curves, their coverage of pixels, and pairs of curves from drawing to drawing."""
+"""Outlines: closed curves, the pixels inside them, and which curves of two drawings belong together."""
 
 from __future__ import annotations
 
@@ -20,17 +20,18 @@ Curves = tuple[tuple[tuple[float, float], ...], ...]  # hashable strokes: fracti
 
 
 def curves(strokes: Sequence[np.ndarray]) -> Curves:
-    """Return strokes (n, 2) as tuples."""
+    """Convert strokes, arrays (n, 2), to tuples, which are hashable."""
     return tuple(tuple((float(x), float(y)) for x, y in stroke) for stroke in strokes)
 
 
 def coverage(strokes: Sequence, width: int, height: int) -> np.ndarray:
-    """Return the share (height, width) float32, 0 to 1, of each pixel that is inside closed curves, the top row first.
+    """Return the share of each pixel that is inside closed curves: (height, width) float32, 0 to 1, the top row first.
 
-    Where two curves overlap is outside (even-odd).
+    A place inside two overlapping curves is outside (even-odd).
 
     Args:
-        strokes: (n, 2) in fractions of the picture, y up.
+        strokes: The curves, (n, 2) in fractions of the picture, y up.
+        width, height: Of the picture, in pixels.
     """
     rows, bands = max(_CROSSINGS // (LINES * max(sum(map(len, strokes)), 1)), 1), []
     for top in range(0, height, rows):
@@ -40,7 +41,7 @@ def coverage(strokes: Sequence, width: int, height: int) -> np.ndarray:
 
 
 def _covered(strokes: Sequence, width: int, height: int, band: range) -> np.ndarray:
-    """Return the coverage of a band of rows."""
+    """Return the rows `band` of what `coverage` returns."""
     lines, scale = range(band.start * LINES, band.stop * LINES), (width, -height * LINES)
     curves = [np.asarray(stroke, np.float64) * scale + (0, height * LINES) for stroke in strokes if len(stroke) > 2]
     _, rows, places = scanlines.crossings(*scanlines.edges(curves), lines)
@@ -61,6 +62,8 @@ def nearest(shapes: Curves, point: tuple[float, float], aspect: float) -> tuple[
     """Return the index of the curve that is nearest to a point, and its distance in heights of the picture.
 
     Args:
+        shapes: The curves.
+        point: In fractions of the picture, y up.
         aspect: The picture's width / height.
 
     Raises:
@@ -74,14 +77,17 @@ def nearest(shapes: Curves, point: tuple[float, float], aspect: float) -> tuple[
 def dragged(
     shapes: Curves, index: int, grabbed: tuple[float, float], by: tuple[float, float], reach: float, aspect: float
 ) -> Curves:
-    """Return curves after pulling one of them.
+    """Return curves after one of them has been pulled by hand.
 
-    The curve's nearest place to `grabbed` moves `by` as much, and its neighbourhood less and less, up to `reach`.
+    The curve's place that is nearest to `grabbed` moves `by` as much. Other places move less, the farther along the
+    curve they are from it, and from `reach` on not at all.
 
     Args:
-        index: Of the pulled curve.
+        shapes: The curves.
+        index: Which of them is pulled.
         grabbed, by: Fractions of the picture, y up.
         reach: Heights of the picture, along the curve.
+        aspect: The picture's width / height.
     """
     points, own = _finer(shapes[index], aspect, reach / 12)  # at least 12 points on either side are pulled
     start = int(_apart(points, grabbed, aspect).argmin())
@@ -95,7 +101,16 @@ def dragged(
 
 
 def _finer(shape: Sequence, aspect: float, most: float) -> tuple[np.ndarray, np.ndarray]:
-    """Add points to a closed curve: return points (n, 2), at most `most` heights apart, and which (n,) are original."""
+    """Return a closed curve with more points.
+
+    Args:
+        shape: The curve, (n, 2) in fractions of the picture.
+        aspect: The picture's width / height.
+        most: The largest distance between two points in heights of the picture.
+
+    Returns:
+        Points (m, 2), and which of them (m,) are the curve's own.
+    """
     points = np.asarray(shape, dtype=np.float64)
     ends = np.roll(points, -1, axis=0)
     counts = np.ceil(np.hypot(*((ends - points) * (aspect, 1)).T) / most).astype(int).clip(1)
@@ -105,14 +120,19 @@ def _finer(shape: Sequence, aspect: float, most: float) -> tuple[np.ndarray, np.
 
 
 def _apart(points: np.ndarray, point: tuple[float, float], aspect: float) -> np.ndarray:
-    """Return the distances of points (n, 2) from another one, in heights of the picture."""
+    """Return the distances (n,) of points (n, 2) from another point, in heights of the picture."""
     return np.hypot(*((points - point) * (aspect, 1)).T)
 
 
 def in_order(drawings: Iterable[Curves], aspect: float) -> list[Curves]:
-    """Return drawings whose similar curves have the same positions and points, by which strokes are paired in between.
+    """Reorder the curves and points of drawings, so that similar curves of successive drawings can be interpolated.
+
+    Strokes are paired by their position in a drawing (scribbles.between_strokes), and their points by theirs. Similar
+    curves get the same position where possible. All curves get _POINTS points, counter-clockwise, from similar places
+    on.
 
     Args:
+        drawings: Curves in fractions of the picture, drawing after drawing.
         aspect: The picture's width / height.
     """
     chains: list[dict[int, np.ndarray]] = []  # a curve by the numbers of its drawings
@@ -131,24 +151,25 @@ def in_order(drawings: Iterable[Curves], aspect: float) -> list[Curves]:
 
 
 def _differ(curve: np.ndarray, other: np.ndarray) -> float:
-    """Return how far two curves' bounding boxes are apart, in parts of the larger one's sides."""
+    """Return the largest distance between equal sides of two curves' bounding boxes, in units of the longest side."""
     boxes = np.array([(points.min(axis=0), points.max(axis=0)) for points in (curve, other)])
     sides = float(np.ptp(boxes, axis=1).max())
     return float(np.abs(boxes[0] - boxes[1]).max()) / max(sides, 1e-9)
 
 
 def _resampled(curve: np.ndarray, aspect: float) -> np.ndarray:
+    """Return a closed curve (n, 2) as _POINTS points at equal distances along it, (_POINTS, 2)."""
     return scribbles.resample(np.concatenate([curve, curve[:1]]), _POINTS + 1, aspect)[:-1]
 
 
 def _turned(curve: np.ndarray) -> np.ndarray:
-    """Return the curve in counter-clockwise order."""
+    """Return a curve with its points in counter-clockwise order."""
     x, y = curve.T
     return curve if np.dot(x, np.roll(y, -1)) >= np.dot(y, np.roll(x, -1)) else curve[::-1]
 
 
 def _aligned(before: np.ndarray, curve: np.ndarray, aspect: float) -> np.ndarray:
-    """Rotate the order of a curve's points so that each is near that of the curve before."""
+    """Return a curve (n, 2) that begins at another of its points, so that each point is near that of `before`."""
     fixed, moved = ((points - points.mean(axis=0)) * (aspect, 1) for points in (before, curve))
     alike = sum(np.fft.irfft(np.conj(np.fft.rfft(fixed[:, k])) * np.fft.rfft(moved[:, k]), len(curve)) for k in (0, 1))
     return np.roll(curve, -int(np.argmax(alike)), axis=0)

@@ -1,5 +1,8 @@
-"""Fading of tracked regions: keys that are 0 where a track has ended, 1 where it is followed, and fade in between, at
-frames where the region is still visible."""
+"""Fading of tracked regions: keys of their opacity, or of the camera's influence, where a track ends or has a gap.
+
+The value is 0 where the subject is not found, and 1 where it is. It fades in between, while the subject is still
+visible.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +18,13 @@ FADE = 5
 
 
 class Stop(NamedTuple):
-    """The end of a track: the first frame without it in that direction, and whether the shot ends there."""
+    """Where a track ends.
+
+    Attributes:
+        frame: The first frame without the track, in the direction of tracking.
+        is_forward: Whether that direction is forward.
+        is_cut: Whether the shot ends there.
+    """
 
     frame: int
     is_forward: bool
@@ -23,7 +32,13 @@ class Stop(NamedTuple):
 
 
 class Key(NamedTuple):
-    """A key: value 0 or 1, and the ease until the next key, as in recipes."""
+    """A key that fades a region in or out.
+
+    Attributes:
+        frame: The frame.
+        value: 0 or 1, a factor for the opacity.
+        ease: The ease until the next key, as in recipes.
+    """
 
     frame: int
     value: float
@@ -31,7 +46,12 @@ class Key(NamedTuple):
 
 
 class Gap(NamedTuple):
-    """Frames without the subject, first to last, possibly infinite; hard: whether an end is at a cut."""
+    """Frames without the subject.
+
+    Attributes:
+        first, last: The first and the last of these frames, or −∞ and ∞.
+        hard_first, hard_last: Whether the first, or the last, is at a cut, where nothing fades.
+    """
 
     first: float
     last: float
@@ -42,14 +62,15 @@ class Gap(NamedTuple):
 def keys(
     seen: Collection[int], stops: Iterable[Stop], kept: Collection[int], fade: int = FADE, beside: int = 0
 ) -> list[Key]:
-    """Return keys, ascending, of how much a subject counts; none if its track has no end.
+    """Return keys, ascending, that fade a region out before each gap of its track and in again after it.
 
     Args:
-        seen: Frames where the subject was found. A gap lasts from a stop to the next of them. A stop at one of them, as
-            other tracks have found it, is only that frame.
+        seen: Frames where the subject was found. A gap lasts from a stop to the next of these frames. If a stop is at
+            such a frame, because another track has found the subject there, the gap is only that frame.
+        stops: Where tracks end. Without any, there are no keys.
         kept: Frames that keep the value 1, even next to a gap.
-        fade: Frames of a fade, fewer between close gaps. At cuts the value jumps.
-        beside: Frames on each side of a gap with the value 0, too.
+        fade: Frames of a fade. It is shorter between gaps that are close, and a jump at cuts.
+        beside: Frames on each side of a gap that have the value 0 as well.
     """
     changes: list[Key] = []
     before = -math.inf
@@ -73,7 +94,7 @@ def keys(
 
 
 def gaps(seen: Collection[int], stops: Iterable[Stop], beside: int = 0) -> list[Gap]:
-    """Return gaps, ascending and separate, for arguments as in `keys`."""
+    """Return the gaps of a track, ascending; those that touch become one. Arguments as for `keys`."""
     merged: list[Gap] = []
     for each in sorted(_gap(seen, stop) for stop in stops):
         gap = each._replace(first=each.first - beside, last=each.last + beside)
@@ -86,6 +107,12 @@ def gaps(seen: Collection[int], stops: Iterable[Stop], beside: int = 0) -> list[
 
 
 def _gap(seen: Collection[int], stop: Stop) -> Gap:
+    """Return the frames without the subject that begin where tracking stopped, or end there if it went backward.
+
+    Args:
+        seen: Frames where the subject was found. They bound the gap; if tracking stopped at one, the gap is that frame.
+        stop: Where tracking stopped.
+    """
     frame = stop.frame
     if frame in seen:
         return Gap(first=frame, last=frame)

@@ -1,4 +1,4 @@
-"""Scribbles: strokes over time, their motion, and the label image that they make (paper §3.3).
+"""Scribbles: drawn strokes over time, where they lie at a frame, and which pixels they cover (paper §3.3).
 
 Points are fractions of the picture, x to the right and y up from the lower left corner; widths are fractions of its
 height. Pictures here have their top row first.
@@ -27,7 +27,15 @@ _FAR = 'region "{name}": a point of its strokes is too far from the picture'
 
 @dataclass(frozen=True)
 class Shape:
-    """A region at one frame: moved strokes (n, 2) and the index of its shutter."""
+    """A region of strokes at one frame.
+
+    Attributes:
+        shutter: The index of its shutter.
+        kind: "line": the shutter is for what the strokes cover; "lasso": for what they enclose.
+        width: Of lines.
+        strokes: Points (n, 2) of each stroke.
+        opacity: 0 to 1.
+    """
 
     shutter: int
     kind: str  # line | lasso
@@ -37,20 +45,26 @@ class Shape:
 
 
 def layers(shapes: Collection[Shape]) -> list[tuple[float, tuple[Shape, ...]]]:
-    """Split shapes with opacities into opaque sets.
+    """Split shapes that have opacities into sets of opaque shapes.
 
-    Coefficients are the mean of those of the sets, weighted by the returned shares, which add up to 1. So at an opacity
-    of one half, coefficients are halfway between those with and without the shape. The first set has all shapes.
+    How much of each shutter a pixel gets is the mean of what the sets give. So at an opacity of one half, it is halfway
+    between that with and that without the shape.
+
+    Returns:
+        (share, shapes) for each set. The shares are the weights of the mean, and sum to 1. The first set has all shapes
+        with an opacity above 0.
     """
     steps = sorted({0.0, 1.0, *(shape.opacity for shape in shapes)})
     return [(high - low, tuple(s for s in shapes if s.opacity >= high)) for low, high in pairwise(steps)]
 
 
 def resample(stroke: ArrayLike, count: int, aspect: float = 1.0) -> np.ndarray:
-    """Return `count` points (count, 2) at equal arc lengths along a stroke (n, 2), with the same ends.
+    """Return `count` points (count, 2) at equal distances along a stroke (n, 2), with the same ends.
 
     Args:
-        aspect: The picture's width / height, for measuring lengths.
+        stroke: The stroke.
+        count: The number of points.
+        aspect: The picture's width / height, for measuring distances.
     """
     stroke = np.asarray(stroke, dtype=np.float64)
     steps = np.hypot(*(np.diff(stroke, axis=0) * (aspect, 1)).T) if len(stroke) > 1 else np.zeros(0)
@@ -64,10 +78,15 @@ def resample(stroke: ArrayLike, count: int, aspect: float = 1.0) -> np.ndarray:
 def between_strokes(
     first: Sequence[ArrayLike], second: Sequence[ArrayLike], u: float, aspect: float = 1.0
 ) -> list[np.ndarray]:
-    """Return strokes a share u of the way from one drawing to the next, paired in order.
+    """Return strokes between those of two drawings, paired in order.
 
-    Strokes with equal numbers of points move point by point, others by arc length. A stroke without a partner stays
-    until the next drawing.
+    Strokes with equal numbers of points move point by point, others by distance along the stroke. A stroke of the first
+    drawing without a partner stays; one of the second appears when that is reached.
+
+    Args:
+        first, second: The strokes (n, 2) of the drawings.
+        u: The share of the way from the first to the second, 0 to 1.
+        aspect: The picture's width / height.
     """
     before, after = ([np.asarray(stroke, dtype=np.float64) for stroke in strokes] for strokes in (first, second))
     if u <= 0:
@@ -82,7 +101,7 @@ def between_strokes(
 
 
 def mapped(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Apply a matrix (3, 3) to points (n, 2)."""
+    """Return points (n, 2) mapped by an affine matrix (3, 3)."""
     return points @ matrix[:2, :2].T + matrix[:2, 2]
 
 
@@ -92,8 +111,10 @@ def transform(
     """Return strokes scaled, turned and moved about the centre of their common bounding box.
 
     Args:
-        location: Fractions of the picture.
+        strokes: (n, 2) each.
+        location: By how much they move, in fractions of the picture.
         rotation: Degrees counter-clockwise.
+        scale: A factor.
         aspect: The picture's width / height, so that circles stay round.
     """
     strokes = [np.asarray(s, dtype=np.float64) for s in strokes]
@@ -108,7 +129,7 @@ def transform(
 def taken_back(
     strokes: Iterable[ArrayLike], location: ArrayLike, rotation: float, scale: float, aspect: float
 ) -> tuple[np.ndarray, ...]:
-    """Invert `transform`."""
+    """Return the strokes that `transform` would turn into the given ones, for the same other arguments."""
     strokes = tuple(np.asarray(s, dtype=np.float64) for s in strokes)
     turned = transform(strokes, (0, 0), -rotation, 1 / scale, aspect)  # the centre may differ
     (there, *_) = transform(turned, location, rotation, scale, aspect)
@@ -117,16 +138,20 @@ def taken_back(
 
 @dataclass(frozen=True)
 class Drawings:
-    """A region's strokes over time, before the region's motion.
+    """What is drawn of a region over time, before the region's keys move it.
 
-    Drawings are lists of strokes (n, 2) at ascending frames. In between, strokes go from one drawing to the next.
+    A drawing is a list of strokes (n, 2) at a frame. Between two drawings, strokes change from one to the other.
 
     Attributes:
-        name: The region's.
+        name: The region's, for errors.
+        frames: The frames of the drawings, ascending.
+        strokes: The drawings.
+        eases: The ease from each drawing to the next.
         aspect: The picture's width / height.
-        placement: Channel of the matrix (3, 3) from the strokes' space to fractions of the picture, or of None where
-            the strokes are not visible. Without a channel, strokes are fractions of the picture.
-        origins: Where the region was when each drawing was made, which shows the drawing in place; empty: not moved.
+        placement: Channel of the matrix (3, 3) from the strokes' coordinates to fractions of the picture, or of None
+            where the strokes are not visible. Without a channel, strokes are fractions of the picture.
+        origins: The region's placement at the time of each drawing. It is taken out of the strokes, so that the
+            region's keys bring them back to where they were drawn. Empty: the region was in its place.
     """
 
     name: str
@@ -138,18 +163,38 @@ class Drawings:
     origins: tuple[Placement, ...] = ()
 
     def at(self, frame: float) -> list[np.ndarray]:
-        """Return strokes (n, 2) in fractions of the picture. EffectError: they are beyond limits.MAX_DISTANCE."""
+        """Return the strokes (n, 2) at a frame in fractions of the picture, before the region's keys move them.
+
+        Raises:
+            EffectError: They are beyond limits.MAX_DISTANCE.
+        """
         if not self.frames:
             return []
         before, after, share = keyframes.eased_span(self.frames, self.eases, frame)
         return between_strokes(self.drawing(before, frame), self.drawing(after, frame), share, self.aspect)
 
     def moved(self, frame: float, placed: Placement) -> tuple[np.ndarray, ...]:
-        """Return strokes like `at`, moved about their centre."""
+        """Return the strokes at a frame as `at` does, moved, turned and scaled about their centre.
+
+        Args:
+            frame: The frame.
+            placed: Where the region's keys put them.
+
+        Raises:
+            EffectError: As for `at`.
+        """
         return transform(self.at(frame), placed.location, placed.rotation, placed.scale, self.aspect)
 
     def drawing(self, index: int, frame: float) -> list[np.ndarray]:
-        """Return the strokes of a drawing as they lie on the picture at a frame. EffectError: as for `at`."""
+        """Return the strokes (n, 2) of one drawing in fractions of the picture at a frame, before keys move them.
+
+        Args:
+            index: Which drawing.
+            frame: The frame; `placement` can change over time.
+
+        Raises:
+            EffectError: As for `at`.
+        """
         if self.placement is None:
             return self.strokes[index]
         if (placement := self.placement.at(frame)) is None:
@@ -164,9 +209,14 @@ class Drawings:
 
 
 def rasterise(shapes: Iterable[Shape], width: int, height: int, *, border: bool = False) -> np.ndarray:
-    """Return labels (height, width) uint16: 0 where free, 1 + shutter where a shape covers the pixel's centre.
+    """Return which shutter is drawn on each pixel: labels (height, width) uint16.
 
-    Later shapes win. `border` labels the frame's edge with the first shutter, under every shape.
+    A label is 1 + the shutter's index if a shape covers the pixel's centre, else 0. Later shapes lie over earlier ones.
+
+    Args:
+        shapes: The shapes.
+        width, height: Of the picture, in pixels.
+        border: Whether the pixels at the picture's edge get the label of the first shutter, beneath all shapes.
     """
     labels = np.zeros((height, width), dtype=np.uint16)
     if border:
@@ -186,7 +236,7 @@ def rasterise(shapes: Iterable[Shape], width: int, height: int, *, border: bool 
 
 
 def _draw(labels: np.ndarray, points: np.ndarray, radius: float, label: int) -> None:
-    """Label the pixels within `radius` of a polyline in pixels, y down."""
+    """Label the pixels within `radius` pixels of a polyline (n, 2) in pixels, y down."""
     radius = max(radius, 0.7072)  # pixels: a 5-point diffusion would leak through a thinner line
     if len(points) == 1:
         points = np.repeat(points, 2, axis=0)
@@ -203,14 +253,15 @@ def _draw(labels: np.ndarray, points: np.ndarray, radius: float, label: int) -> 
 
 
 def _seen(starts: np.ndarray, steps: np.ndarray, size: np.ndarray, reach: float) -> np.ndarray:
-    """Return the shares (2, n) of segments between which they are near a picture of this size (x, y).
+    """Return between which shares of its length, 0 to 1, each segment is near a picture, (2, n).
 
     Args:
-        starts, steps: (n, 2) in pixels.
-        reach: The distance that counts as near, in either direction.
+        starts, steps: (n, 2), the segments' starts, and the way to their ends, in pixels.
+        size: Of the picture (width, height).
+        reach: How far outside of the picture still counts as near, in pixels.
 
     Returns:
-        Where a segment is nowhere near, its first share is above its second.
+        If a segment is nowhere near, its first share is above its second.
     """
     inside = (starts >= -reach) & (starts <= size + reach)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -221,6 +272,7 @@ def _seen(starts: np.ndarray, steps: np.ndarray, size: np.ndarray, reach: float)
 
 
 def _draw_segment(labels: np.ndarray, a: np.ndarray, b: np.ndarray, radius: float, label: int) -> None:
+    """Label the pixels within `radius` pixels of the segment from `a` to `b`, (2,) in pixels, y down."""
     height, width = labels.shape
     limit = np.array([width, height])
     low = np.clip(np.floor(np.minimum(a, b) - radius), 0, limit).astype(int)

@@ -1,8 +1,10 @@
 """Shutters: bars, exposure, accumulation, quantile, and their interpolation (paper §3.1, §3.2, §3.4.1).
 
-A shutter is an array of L bars ≥ 0, one per source frame of the window. Its exposure is e = Σ bars. Its normalised
-accumulation S is piecewise linear on [0, L] and rises from 0 to 1. Its quantile S⁻¹ maps z in [0, 1] to a time in
-[0, L]. Everything here is exact, in float64, and the reference of every device.
+A shutter is an array of L bars ≥ 0, one per source frame of the window: how much that frame contributes. Its exposure
+is e = Σ bars. Its normalised accumulation S is piecewise linear on [0, L] and rises from 0 to 1. Its quantile S⁻¹ maps
+z in [0, 1] to a time in [0, L]. Everything here is exact, in float64, and the reference of every device.
+
+Smooth makes frames between filmed ones. All of these are called moments; bars of filmed frames are spread over them.
 
 Presets make L bars in [0, 1] from a window length and a few parameters.
 """
@@ -27,7 +29,7 @@ _SEEN = 1 / 255  # of the largest bar: less light in other moments is invisible
 
 
 class ShutterError(ValueError):
-    """Bars are not a shutter. The message is one sentence for the user."""
+    """Numbers are not valid bars of a shutter. The message is one sentence for the user."""
 
 
 def check_bars(bars: ArrayLike) -> np.ndarray:
@@ -55,17 +57,24 @@ def check_bars(bars: ArrayLike) -> np.ndarray:
 
 
 def accumulation(bars: ArrayLike) -> np.ndarray:
-    """Return S at the L + 1 frame boundaries, float64, from 0 to exactly 1, for bars as in `check_bars`."""
+    """Return the normalised accumulation S of bars (L,): (L + 1,) float64, from 0 to exactly 1.
+
+    S at boundary k is the share of the light that falls on the frames before frame k. Bars as in `check_bars`.
+    """
     sums = np.concatenate([[0.0], np.cumsum(np.asarray(bars, dtype=np.float64))])
     return sums / sums[-1]
 
 
 @dataclass(frozen=True)
 class Quantile:
-    """S⁻¹ as linear pieces between the levels z (K + 1,), 0 to 1.
+    """The quantile S⁻¹ of one or more shutters as linear pieces: at which time the share z of the light has come in.
 
     Piece k runs from time start[k] at z[k] to end[k] at z[k + 1]. Where end[k] < start[k + 1], the shutter is closed in
-    between and S⁻¹ jumps. start and end have shape (K,), or (K, N) for N shutters on common levels.
+    between and S⁻¹ jumps.
+
+    Attributes:
+        z: (K + 1,), the bounds of the pieces, from 0 to 1.
+        start, end: Times in frames of the window, (K,), or (K, N) for N shutters with common z.
     """
 
     z: np.ndarray
@@ -74,7 +83,7 @@ class Quantile:
 
 
 def quantile(bars: ArrayLike) -> Quantile:
-    """Return the quantile of one shutter: a piece per open bar."""
+    """Return the quantile of one shutter's bars (L,): a piece for each open bar."""
     total = accumulation(bars)
     is_open = np.diff(total) > 0
     frames = np.flatnonzero(is_open).astype(np.float64)
@@ -83,10 +92,11 @@ def quantile(bars: ArrayLike) -> Quantile:
 
 
 def knots(shutters: ArrayLike) -> Quantile:
-    """Return the quantiles of N shutters (N, L) on the union of their levels; start and end have shape (K, N).
+    """Return the quantiles of N shutters (N, L) with common z; start and end have shape (K, N).
 
-    The levels do not depend on the coefficients c: a pixel's quantile on piece k runs from c·start[k] to c·end[k].
-    Levels where no shutter jumps or bends are left out: a box has one piece, whatever its length.
+    A pixel that mixes the shutters by coefficients c (N,) then has a quantile whose piece k runs from c·start[k] to
+    c·end[k], with the same z. Bounds where no shutter jumps or bends are left out: a box has one piece, whatever its
+    length.
     """
     parts = [quantile(bars) for bars in np.atleast_2d(shutters)]
     levels = np.unique(np.concatenate([part.z for part in parts]))
@@ -106,7 +116,12 @@ def knots(shutters: ArrayLike) -> Quantile:
 
 
 def _on_levels(part: Quantile, levels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the start and end times of a quantile between common levels, which contain its own within rounding."""
+    """Return the times of a quantile at other bounds z: at the start and at the end of each piece.
+
+    Args:
+        part: The quantile.
+        levels: The new bounds (n + 1,), which contain its own within rounding.
+    """
     middle = (levels[:-1] + levels[1:]) / 2
     piece = np.clip(np.searchsorted(part.z, middle) - 1, 0, len(part.start) - 1)
     z0, z1 = part.z[piece], part.z[piece + 1]
@@ -117,9 +132,14 @@ def _on_levels(part: Quantile, levels: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
 
 def weights(start: np.ndarray, end: np.ndarray, dz: np.ndarray, window: int) -> np.ndarray:
-    """Return the normalised weights (…, L) of the frames for a quantile's pieces: start, end (…, K) and dz (K,).
+    """Return how much of the light each frame of a window gets, (…, L) with the sum 1, for quantiles of many pixels.
 
-    q(τ) = Q(τ + 1) − Q(τ): each piece spreads dz evenly over the time from its start to its end.
+    q(τ) = Q(τ + 1) − Q(τ): each piece spreads its share of the light evenly over the time from its start to its end.
+
+    Args:
+        start, end: The times of the pieces, (…, K).
+        dz: The pieces' shares of the light, (K,).
+        window: L.
     """
     pixels = tuple(range(start.ndim - 1))
     begun, over = start.min(axis=pixels), end.max(axis=pixels)
@@ -135,9 +155,10 @@ def weights(start: np.ndarray, end: np.ndarray, dz: np.ndarray, window: int) -> 
 
 
 def displace(shutters: ArrayLike, coefficients: ArrayLike) -> np.ndarray:
-    """Interpolate shutters (N, L) by displacement (paper §3.2, §3.4.1; exact).
+    """Interpolate N shutters by displacement: their light moves in time instead of fading (paper §3.2, §3.4.1; exact).
 
     Args:
+        shutters: Bars (N, L).
         coefficients: (…, N), Σc = 1, c ≥ 0.
 
     Returns:
@@ -151,7 +172,10 @@ def displace(shutters: ArrayLike, coefficients: ArrayLike) -> np.ndarray:
 
 
 def mix(shutters: ArrayLike, coefficients: ArrayLike) -> np.ndarray:
-    """Interpolate by value: bars (…, L) of Σ cᵢ sᵢ/eᵢ, scaled to e(q). Arguments as for `displace`."""
+    """Interpolate N shutters by value, as a cross-fade: bars (…, L) of Σ cᵢ sᵢ/eᵢ, scaled to the exposure e(q).
+
+    Arguments as for `displace`.
+    """
     shutters = np.atleast_2d(np.asarray(shutters, dtype=np.float64))
     coefficients = np.asarray(coefficients, dtype=np.float64)
     q = coefficients @ (shutters / shutters.sum(axis=1, keepdims=True))
@@ -162,20 +186,20 @@ INTERPOLATIONS = {"displacement": displace, "value": mix}
 
 
 def open_span(shutters: ArrayLike) -> tuple[int, int]:
-    """Return the first frame of the window, and one past the last, that any mix of shutters (N, L) can expose."""
+    """Return the index of the first frame, and one past the last, that any of N shutters (N, L) exposes."""
     used = np.flatnonzero(np.any(np.atleast_2d(shutters) > 0, axis=0))
     return int(used[0]), int(used[-1]) + 1
 
 
 def are_open(bars: np.ndarray) -> np.ndarray:
-    """Return which bars (L,) are open: bool (L,). Rounding errors in closed bars do not count."""
+    """Return which bars (L,) are open: bool (L,). Bars that are only rounding errors count as closed."""
     return bars > _CLOSED * bars.sum()
 
 
 def resample(bars: ArrayLike, window: int) -> np.ndarray:
-    """Return bars (window,) of the same shape over a window of another length.
+    """Return bars (window,) of the same shape for a window of another length.
 
-    The share of the window's light stays. The angle stays where no bars are averaged.
+    The mean height of the bars stays. So does the shutter angle, if no bars are averaged.
     """
     bars = np.asarray(bars, dtype=np.float64)
     total = np.concatenate([[0.0], np.cumsum(bars)])
@@ -184,7 +208,12 @@ def resample(bars: ArrayLike, window: int) -> np.ndarray:
 
 
 def spanning(bars: ArrayLike, start: float, end: float) -> np.ndarray:
-    """Return bars (L,) of the same shape and sum that are open from `start` to `end`, 0 ≤ start < end ≤ L."""
+    """Return bars (L,) of the same shape and sum, stretched or shrunk in time.
+
+    Args:
+        bars: (L,).
+        start, end: When the new bars open and close, in frames of the window: 0 ≤ start < end ≤ L.
+    """
     bars = np.asarray(bars, dtype=np.float64)
     first, last = open_span(bars)
     boundaries = np.arange(len(bars) + 1, dtype=np.float64)
@@ -194,18 +223,20 @@ def spanning(bars: ArrayLike, start: float, end: float) -> np.ndarray:
 
 
 def smoothed(bars: ArrayLike, steps: int, *, backward: bool = False, level: bool = False) -> np.ndarray:
-    """Spread bars (L,) over the moments between filmed frames.
+    """Spread the bars (L,) of filmed frames over moments, which are filmed frames and those made between them.
 
-    Light between two frames counts if both of their bars are open: each bar spreads its weight evenly over the half
-    intervals towards its open neighbours. A bar without open neighbours exposes only the filmed frame.
+    The time between two frames is exposed if both of their bars are open: each bar spreads its weight evenly over the
+    half intervals towards its open neighbours. A bar without open neighbours exposes only the filmed frame.
 
     Args:
+        bars: (L,).
         steps: Moments per filmed frame, 1 or an even number.
-        backward: Whether the source plays in reverse, so that a bar's frame is the last of its moments.
-        level: Keep the heights of bars instead of their sums, for the lightest of all moments.
+        backward: Whether the footage plays backward, so that a bar's frame is the last of its moments.
+        level: Keep the relative heights of bars instead of each bar's sum, for the lightest or darkest of all moments.
 
     Returns:
-        Weights (L · steps,) with the same sum. Moment k · steps is filmed frame k, backward k · steps + steps − 1.
+        Bars of moments (L · steps,) with the same sum. Moment k · steps is filmed frame k, backward k · steps + steps −
+        1.
     """
     bars = np.asarray(bars, dtype=np.float64)
     if steps == 1:
@@ -228,23 +259,28 @@ def smoothed(bars: ArrayLike, steps: int, *, backward: bool = False, level: bool
 
 
 def _open_beside(bars: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return which bars (L,) are open with an open neighbour before them, and which with one after them."""
+    """Return which bars (L,) are open with an open bar before them, and which with one after them: bool (L,) each."""
     open_ones = are_open(bars)
     after = open_ones & np.append(open_ones[1:], False)
     return np.append(False, after[:-1]), after
 
 
 def held(bars: ArrayLike, steps: int) -> np.ndarray:
-    """Spread each bar evenly over its frame's `steps` moments: (L · steps,), with the same sum."""
+    """Spread each bar (L,) of a filmed frame evenly over the `steps` moments (this frame, and those made after it).
+
+    Returns:
+        Bars of moments (L · steps,) with the same sum.
+    """
     return np.repeat(np.asarray(bars, dtype=np.float64) / steps, steps)
 
 
 class Filmed(NamedTuple):
-    """Bars of filmed frames in place of bars of moments.
+    """Bars of filmed frames that replace bars of moments (filmed frames, and those made between them).
 
     Attributes:
-        lost: Numbers, from 1, of the first and last moment of the filmed frame whose light moved most; None if it did
-            not move.
+        bars: (L,).
+        lost: Where they expose other moments: the numbers, from 1, of the first and last moment of the filmed frame
+            that differs most. None: nowhere.
     """
 
     bars: np.ndarray
@@ -252,15 +288,17 @@ class Filmed(NamedTuple):
 
 
 def filmed(moments: ArrayLike, steps: int, position: str, spread: Callable[[np.ndarray], np.ndarray]) -> Filmed:
-    """Convert bars of moments, as in recipes of version 1, into bars of filmed frames.
+    """Convert bars of moments (filmed frames, and those made between them) into bars of filmed frames.
 
-    A window that ended within a filmed frame gets all of it: the last one, or the first if `position` is "end". The
-    largest bar keeps its weight.
+    Recipes of version 1 have bars of moments. If the window ends within a filmed frame, that one counts as a whole: the
+    last one, or the first if `position` is "end".
 
     Args:
+        moments: (n,).
         steps: Moments per filmed frame.
-        spread: Makes bars of moments from the new bars. If no bars reproduce the old moments, each new bar is the mean
-            of its frame's moments.
+        position: Options.position.
+        spread: Turns the new bars into bars of moments. If no new bars give the old moments again, each new bar is the
+            mean of its frame's moments.
     """
     moments = np.asarray(moments, dtype=np.float64)
     lacking = -len(moments) % steps
@@ -281,7 +319,7 @@ def filmed(moments: ArrayLike, steps: int, position: str, spread: Callable[[np.n
 
 
 def open_angle(bars: ArrayLike) -> float:
-    """Return the shutter angle in degrees: 360 for a window of equal bars."""
+    """Return the angle of a rotary shutter with the light of these bars, in degrees: 360 for a window of equal bars."""
     bars = np.asarray(bars, dtype=np.float64)
     return 360.0 * float(bars.sum()) / (len(bars) * max(bars.max(), 1e-30))
 
@@ -290,19 +328,19 @@ def open_angle(bars: ArrayLike) -> float:
 
 
 def still(window: int, frame: int = 0) -> np.ndarray:
-    """Return one sharp frame, a delta at `frame`, clamped to the window."""
+    """Return bars (window,) of one sharp frame, `frame`, clamped to the window."""
     bars = np.zeros(window)
     bars[min(max(frame, 0), window - 1)] = 1
     return bars
 
 
 def angle(window: int, degrees: float = 180.0) -> np.ndarray:
-    """Return a rotary disc, open for `degrees` of 360 of the window; the last bar may be partly open."""
+    """Return bars (window,) of a rotary shutter that is open for `degrees` of 360. The last open bar may be below 1."""
     return np.clip(window * degrees / 360.0 - np.arange(window), 0, 1)
 
 
 def cuts(window: int, count: int = 2, width: int = 1) -> np.ndarray:
-    """Return a disc with `count` even cuts, each `width` frames wide: multiple exposures."""
+    """Return bars (window,) of `count` exposures at even distances, each `width` frames long: a multiple exposure."""
     bars = np.zeros(window)
     for start in np.floor(np.arange(count) * window / count).astype(int):
         bars[start : start + width] = 1
@@ -310,33 +348,33 @@ def cuts(window: int, count: int = 2, width: int = 1) -> np.ndarray:
 
 
 def ramp_up(window: int) -> np.ndarray:
-    """Return a ramp from almost closed to open: a trail that ends sharp."""
+    """Return bars (window,) that rise from almost closed to open: a trail that ends sharp."""
     return np.arange(1, window + 1) / window
 
 
 def ramp_down(window: int) -> np.ndarray:
-    """Return a ramp from open to almost closed."""
+    """Return bars (window,) that fall from open to almost closed: a trail that starts sharp."""
     return ramp_up(window)[::-1].copy()
 
 
 def triangle(window: int) -> np.ndarray:
-    """Return a triangle around the middle of the window."""
+    """Return bars (window,) that rise to the middle of the window and fall again."""
     bars = 1 - np.abs(2 * (np.arange(window) + 0.5) / window - 1)
     return bars / bars.max()
 
 
 def gaussian(window: int, sigma: float = 0.2) -> np.ndarray:
-    """Return a bell around the middle; `sigma` in windows."""
+    """Return bars (window,) of a bell curve around the middle. `sigma` is its standard deviation in windows."""
     return np.exp(-0.5 * (((np.arange(window) + 0.5) / window - 0.5) / sigma) ** 2)
 
 
 def trail(window: int, decay: float = 0.25) -> np.ndarray:
-    """Return an exponential trail: a bar falls to 1/e of the first after `decay` windows."""
+    """Return bars (window,) that fall exponentially, to 1/e of the first after the share `decay` of the window."""
     return np.exp(-np.arange(window) / (decay * window))
 
 
 def stutter(window: int, every: int = 4) -> np.ndarray:
-    """Return every n-th frame, as a strobe lights them."""
+    """Return bars (window,) that are open at every n-th frame (`every`), as if a strobe lit them."""
     return (np.arange(window) % every == 0).astype(float)
 
 
@@ -363,7 +401,16 @@ PRESETS: dict[str, tuple[str, str, Callable[[int], np.ndarray]]] = {
 
 
 def preset_bars(name: str, window: int, position: str = "start") -> np.ndarray:
-    """Return the bars (L,) of a preset, a key of PRESETS, for a frame_state.Position. KeyError: no such preset."""
+    """Return the bars (window,) of a preset.
+
+    Args:
+        name: A key of PRESETS.
+        window: The number of bars.
+        position: Options.position, on which the bar of the shown frame depends ("STILL").
+
+    Raises:
+        KeyError: There is no such preset.
+    """
     if name == "STILL":
         return still(window, {"center": (window - 1) // 2, "end": window - 1}.get(position, 0))
     return PRESETS[name][2](window)

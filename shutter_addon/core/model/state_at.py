@@ -1,13 +1,13 @@
-"""The state of an effect at a timeline frame, as plain data with everything that a picture needs.
+"""The state of an effect at a timeline frame: `state_at` puts together everything that a picture needs, as plain data.
 
-Also the motions that exposures follow: where the points of the shown picture lie in the frames around it. Keys are on
-timeline frames, but a window has source frames. Keys place a source frame's content at the timeline frame that shows
-it: the nearest one to the shown frame if there are several, or a time between two frames for source frames that are
-skipped and for moments. Between timeline frames, motion is linear.
+Exposures can follow a motion. Keys of regions and of the camera are on timeline frames, but a window consists of source
+frames. So the content of a source frame is where the keys place it at the timeline frame that shows this source frame:
+the nearest one to the shown frame if there are several, or a time between two timeline frames for source frames that
+are skipped and for moments. Between timeline frames, motion is linear.
 
-And lengths of exposures whose bars only describe their shape:
+Exposures can also have a length that the bars do not set. Then bars only describe a shape:
 
-Trail length: the exposure lasts while the followed subject moves by a given distance, at any speed. The bars' times are
+Trail length: the shutter is open while what it follows moves by a given distance, at any speed. The bars' times are
 scaled about the shown frame, so that the quantile keeps its shape. The span is not a whole number of frames and changes
 without jumps.
 
@@ -35,7 +35,13 @@ from .motions import Placement, Similarity
 
 
 class Moment(NamedTuple):
-    """The shown frame of the clip, the effect there, and the direction: 1, or −1 where the clip runs backward."""
+    """The state of an effect at a timeline frame, and the frame of the footage that is shown there.
+
+    Attributes:
+        source_frame: The shown frame of the clip, from 0.
+        state: The effect.
+        direction: 1, or −1 where the footage plays backward.
+    """
 
     source_frame: int
     state: FrameState
@@ -43,13 +49,13 @@ class Moment(NamedTuple):
 
 
 def state_at(effect: Effect, clip: Clip, frame: float) -> Moment:
-    """Return an effect's state at a timeline frame of a clip.
+    """Return an effect's state at a timeline frame, with everything that does not need the footage's pictures.
 
-    It has the bars' lengths on the timeline and of trails, followed motions and layers. Cuts are not considered yet,
-    since no frame is read.
+    Beyond Effect.at, it has bars of moments, exposures with lengths of their own, followed motions, and layers. Cuts
+    are not considered yet, since no frame is read.
 
     Raises:
-        EffectError: No picture can be made of it.
+        EffectError: No picture can be made of the effect.
     """
     if effect.time is not None:
         clip = replace(clip, timing=effect.time)
@@ -63,9 +69,10 @@ def state_at(effect: Effect, clip: Clip, frame: float) -> Moment:
 
 
 def _in_moments(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameState:
-    """Return the state with bars of the clip's moments, `clip.step` per filmed frame.
+    """Return the state with bars and window in the clip's moments: filmed frames, and those made between them.
 
-    Bars that shape an exposure of another length keep their shape.
+    There are `clip.step` per filmed frame. Bars that are only the shape of an exposure keep that shape: they are spread
+    evenly.
     """
     options = replace(state.options, window=state.options.window * clip.step, step=clip.step, backward=at.direction < 0)
     if clip.step == 1:
@@ -78,7 +85,11 @@ def _in_moments(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> Fra
 
 
 def _layered(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameState:
-    """Return the state at a timeline frame with its layers. EffectError: a layer is too far outside the picture."""
+    """Return the state with the effect's layers, and their mattes in all source frames that the picture may use.
+
+    Raises:
+        EffectError: The strokes of a layer are too far outside the picture.
+    """
     if not (regions := effect.layers_at(at.frame)):
         return state
     shown, beyond, step = seen(state.options, at, clip.count), state.options.plate_reach, state.options.step
@@ -110,18 +121,28 @@ def _layered(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameS
 
 
 def _matte(region: Region | MatteRegion, frame: float, share: float) -> Matte | None:
-    """Return the region's matte at a time between two timeline frames: that of the nearer one."""
+    """Return a region's matte between two timeline frames: that of the nearer one. A region of strokes has none.
+
+    Args:
+        region: The region.
+        frame: The timeline frame before.
+        share: The share of the way to the next frame, 0 to 1.
+    """
     return region.at(frame + round(share)) if isinstance(region, MatteRegion) else None
 
 
 def _scribbles(
     effect: Effect, state: FrameState, drawn: Sequence[tuple[int, Region]], count: int, frame: float, share: float
 ) -> FrameState:
-    """Return a state of Layers.scribbles at a time between a timeline frame and the next.
+    """Return a state of Layers.scribbles between two timeline frames. Its shutter 1 + i stands for layer i.
 
     Args:
+        effect: The effect.
+        state: Its state at the shown frame, for the options.
         drawn: Regions, later ones on top, each with 1 + its layer's number, or 0 without a layer.
         count: The number of layers.
+        frame: The timeline frame before.
+        share: The share of the way to the next frame, 0 to 1.
     """
     placed = [(number, _between(region, frame, share)) for number, region in drawn]
     shapes = tuple(replace(shape, shutter=number, opacity=1.0) for number, shape in placed if shape.opacity > 0)
@@ -130,6 +151,7 @@ def _scribbles(
 
 
 def _between(region: Region, frame: float, share: float) -> scribbles.Shape:
+    """Return a region's shape between a timeline frame and the next one, at a share 0 to 1 of the way."""
     before = region.at(frame)
     if not share:
         return before
@@ -146,10 +168,10 @@ Places = Callable[[float], tuple[Placement, np.ndarray | None]]
 
 
 def followed(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameState:
-    """Return the state at a timeline frame with the motions that shutters follow, and with bars of trails.
+    """Return the state with the motions that shutters follow, and with the lengths of exposures that depend on them.
 
     Raises:
-        EffectError: A followed subject is too far outside the picture.
+        EffectError: The strokes of something followed are too far outside the picture.
     """
     if not any(shutter.follow for shutter in effect.shutters):
         return state
@@ -173,7 +195,7 @@ def followed(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameS
 
 
 def _with_trails(effect: Effect, state: FrameState, following: Following, clip: Clip, at: Shown) -> np.ndarray:
-    """Return the state's bars (N, L), with the lengths of trails."""
+    """Return the bars (N, L) of the state with lengths that depend on a motion: of trails, and by Camera.influence."""
     bars = state.bars.copy()
     positions = windows.positions(state.options, at.source_frame, at.direction)
     shown_at = float(np.abs(positions - at.source_frame).argmin()) + 0.5
@@ -193,18 +215,24 @@ def _with_trails(effect: Effect, state: FrameState, following: Following, clip: 
 
 
 def reach(filmed: int) -> int:
-    """Return how many timeline frames around the shown one are searched for a window's source frames.
+    """Return how many timeline frames before and after the shown one are searched for a window's source frames.
 
     It suffices for footage at a quarter of its speed. Source frames beyond get the motion of the nearest one.
 
     Args:
-        filmed: Filmed frames of the window.
+        filmed: The number of filmed frames in the window.
     """
     return 4 * filmed
 
 
 def seen(options: Options, at: Shown, count: int) -> range:
-    """Return the source frames, out of `count`, that a window may show, wherever its shot ends."""
+    """Return the source frames that a window may show, wherever the cuts around it lie.
+
+    Args:
+        options: The state's options.
+        at: The shown frame.
+        count: The number of source frames.
+    """
     positions = windows.positions(options, at.source_frame, at.direction)
     if options.edges == "slide" and options.stop_at_cuts:  # a cut may lie on either side
         positions = at.source_frame + np.array([-1, 1]) * (options.window + options.step)
@@ -214,7 +242,18 @@ def seen(options: Options, at: Shown, count: int) -> range:
 
 
 def times_of(clip: Clip, at: Shown, wanted: range, reach: int) -> list[float]:
-    """Return the timeline's time, nearest to the shown frame and within reach, that shows each wanted source frame."""
+    """Return a timeline time for each wanted source frame: when the timeline shows it, nearest to the shown frame.
+
+    Args:
+        clip: The footage.
+        at: The shown frame.
+        wanted: The source frames.
+        reach: Timeline frames before and after the shown one that are searched. A source frame that is not shown there
+            has the time of the nearest one that is.
+
+    Returns:
+        Timeline frames, with a fraction if the timeline skips the source frame.
+    """
     times, last = {at.source_frame: at.frame}, {1: at.source_frame, -1: at.source_frame}
     for distance in range(1, reach + 1):
         if len(times) == len(wanted):
@@ -232,13 +271,22 @@ def times_of(clip: Clip, at: Shown, wanted: range, reach: int) -> list[float]:
 
 
 def smoothing(smooth: int) -> np.ndarray:
-    """Return weights (2 · smooth + 1,), Σ = 1, of the frames around one: a bell, which has no jolts like a box."""
+    """Return weights (2 · smooth + 1,) with the sum 1 for averaging a motion over `smooth` frames on each side.
+
+    They form a bell, since a box would leave jolts.
+    """
     bell = 1 + np.cos(np.pi * np.arange(-smooth, smooth + 1) / (smooth + 1))
     return bell / bell.sum()
 
 
 def places_of(subject: Subject, motion: motions.Motion = "scale", smooth: int = 0) -> Places:
-    """Return a function that gives a subject's places, with the followed part of its motion, averaged over time."""
+    """Return a function of a timeline frame that gives a subject's placement and centre, as a shutter follows it.
+
+    Args:
+        subject: The region or camera.
+        motion: What counts of its motion.
+        smooth: Frames on each side over which it is averaged.
+    """
 
     @cache
     def own(frame: float) -> tuple[Placement, np.ndarray | None]:
@@ -260,13 +308,27 @@ def places_of(subject: Subject, motion: motions.Motion = "scale", smooth: int = 
 
 
 def moves(places: Places, clip: Clip, frame: float, times: list[float]) -> np.ndarray:
-    """Return turns and shifts (2, n) of the motions of the picture from a timeline frame to (fractional) times."""
+    """Return the motions of the picture from a timeline frame to several times: turns and shifts (2, n) complex128.
+
+    Args:
+        places: From `places_of`.
+        clip: The footage, for the picture's size.
+        frame: The timeline frame.
+        times: n timeline frames, possibly with fractions.
+    """
     found = [motion_to(places, frame, time, (clip.width, clip.height)) for time in times]
     return np.array([(motion.turn, motion.shift) for motion in found], np.complex128).T
 
 
 def motion_to(places: Places, frame: float, time: float, size: tuple[int, int]) -> Similarity:
-    """Return the motion of the picture from a timeline frame to a (fractional) time; none if nothing is drawn."""
+    """Return the motion of the picture from a timeline frame to a time; no motion if nothing is drawn.
+
+    Args:
+        places: From `places_of`.
+        frame: The timeline frame.
+        time: A timeline frame, possibly with a fraction; the motion is linear between two frames.
+        size: Of the picture (width, height).
+    """
     whole = frame + math.floor(time - frame)
     share = time - whole
     start, centre = places(frame)
@@ -287,13 +349,13 @@ _LEAST = 1e-9
 
 
 def travelled(places: np.ndarray) -> np.ndarray:
-    """Return how far a subject has moved at the boundaries of the window's bars: (L + 1,), ascending from 0.
+    """Return how far something has moved at the boundaries of the window's bars: (L + 1,), ascending from 0.
 
-    The fastest point counts for each step. The step between two frames belongs to both of their bars. The outermost
-    bars continue at their neighbour's pace.
+    The point that moves farthest counts, frame by frame. Half of the way between two frames belongs to each of their
+    bars. The first and the last bar go on at the pace beside them.
 
     Args:
-        places: (L, P) complex, P points of the subject in the window's frames.
+        places: (L, P) complex, where P of its points lie in the window's frames.
     """
     steps = np.abs(np.diff(places, axis=0)).max(axis=1, initial=0)
     if not steps.size:
@@ -303,12 +365,11 @@ def travelled(places: np.ndarray) -> np.ndarray:
 
 
 def shortened(bars: np.ndarray, share: float, shown: float) -> np.ndarray:
-    """Return bars (L,) of the same shape and sum that are open for a share of their time.
-
-    They are open for at least one frame.
+    """Return bars (L,) of the same shape and sum that are open for a share of their time, but at least for one frame.
 
     Args:
-        share: 0 to 1, about the shown frame.
+        bars: (L,).
+        share: 0 to 1. The time shrinks towards the shown frame.
         shown: The middle of the shown frame's bar, in 0 … L; clamped to the open bars.
     """
     bars = np.where(shutters.are_open(bars), bars, 0)
@@ -319,14 +380,16 @@ def shortened(bars: np.ndarray, share: float, shown: float) -> np.ndarray:
 
 
 def with_length(bars: np.ndarray, way: np.ndarray, length: float, shown: float) -> np.ndarray:
-    """Return bars (L,) of the same shape and sum that are open while a subject moves by `length`.
+    """Return bars (L,) of the same shape and sum that are open while something moves by a distance.
 
-    If the subject moves less, they are open for the whole window.
+    If it does not move as far, they are open for the whole window.
 
     Args:
-        way: From `travelled`, in the unit of `length`.
-        shown: The time in 0 … L that keeps its place, clamped to the open bars. Where one end of the span reaches the
-            window's end, only the other one continues.
+        bars: (L,).
+        way: How far it has moved at the bars' boundaries (L + 1,), from `travelled`.
+        length: The distance, in the same unit.
+        shown: The time in 0 … L that keeps its place, clamped to the open bars. If the exposure reaches one end of the
+            window, it only grows towards the other.
     """
     bars = np.where(shutters.are_open(bars), bars, 0)
     first, last = shutters.open_span(bars)
@@ -351,7 +414,7 @@ def with_length(bars: np.ndarray, way: np.ndarray, length: float, shown: float) 
 
 
 def exposed(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameState:
-    """Return the state at a timeline frame with the bars of shutters with the timeline's length."""
+    """Return the state with the bars of shutters whose `length` is "timeline": they expose one timeline frame."""
     chosen = [i for i, shutter in enumerate(effect.shutters) if shutter.length == "timeline"]
     if not chosen:
         return state
@@ -368,14 +431,16 @@ def exposed(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameSt
 
 
 def on_timeline(bars: np.ndarray, options: Options, positions: np.ndarray) -> np.ndarray:
-    """Return bars (L,) of the window for bars that shape an exposure over a timeline frame, with the same sum.
+    """Return bars (L,) of the window for bars that shape an exposure of one timeline frame. Their sum stays.
 
-    Light outside the window is left out. By Options.position, the exposure begins with the shown filmed frame, has its
-    middle there, or ends with it.
+    By Options.position, the exposure begins with the shown filmed frame, has its middle there, or ends with it. What
+    lies outside the window is left out.
 
     Args:
-        positions: (n,), n odd: positions in the source, in frames, from the previous to the next timeline frame at even
-            distances.
+        bars: (L,), the shape.
+        options: Of the state.
+        positions: The footage's positions (Clip.position) at n times (n odd) at even distances, from the previous
+            timeline frame to the next one.
     """
     window, here = len(bars), positions[len(positions) // 2]
     begin, anchor = {
@@ -398,7 +463,7 @@ def on_timeline(bars: np.ndarray, options: Options, positions: np.ndarray) -> np
 
 
 def _spread(start: float, end: float, window: int) -> np.ndarray:
-    """Return how much of the time from start to end falls on each frame of a window (L,)."""
+    """Return the shares (L,) of the time from `start` to `end` that fall on each frame of a window."""
     if end - start < _INSTANT:
         return (np.arange(window) == np.floor(start + _INSTANT)).astype(float)
     boundaries = np.clip(np.arange(window + 1), start, end)

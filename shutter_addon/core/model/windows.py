@@ -1,4 +1,8 @@
-"""Windows: the source frames around the shown one that an exposure can use, also at the ends of a shot."""
+"""Windows: the source frames around the shown one that an exposure can use, also at the ends of a shot.
+
+A shot is the source frames between two cuts. A position is the number that a frame of the window would have if the
+footage went on beyond its ends.
+"""
 
 from __future__ import annotations
 
@@ -11,35 +15,42 @@ from .frame_state import FrameState, Options
 
 
 def positions(options: Options, index: int, direction: int = 1) -> np.ndarray:
-    """Return the positions (L,) of the window's frames around source frame `index`, also beyond the clip's ends.
+    """Return the positions (L,) of the frames that can be exposed when a frame is shown, in the window's order.
+
+    A filmed frame lasts until the next one. So if the footage plays backward, the moments after it come first, and the
+    filmed frame last.
 
     Args:
-        direction: 1, or −1 where the source plays in reverse. Then later frames of the window are before `index`. A
-            filmed frame lasts until the next one, so in reverse the moments after it come first, the last one leading.
+        options: Of the state.
+        index: The shown source frame.
+        direction: 1, or −1 if the footage plays backward: later frames of the window then have lower positions.
     """
     return origin(options, index, direction) + direction * np.arange(options.window)
 
 
 def reach(state: FrameState, index: int, direction: int = 1) -> tuple[int, int]:
-    """Return the first and the last position that any shutter exposes."""
+    """Return the lowest and the highest position that any shutter exposes. Arguments as for `positions`."""
     first = origin(state.options, index, direction)
     ends = [first + direction * place for place in (state.open_span[0], state.open_span[1] - 1)]
     return min(ends), max(ends)
 
 
 def origin(options: Options, index: int, direction: int = 1) -> int:
-    """Return the position of the window's first frame, for arguments as in `positions`."""
+    """Return the position of the window's first frame. Arguments as for `positions`."""
     return (index if direction > 0 else index + options.step - 1) - direction * options.before
 
 
 def slid(state: FrameState, index: int, direction: int, shot: range, *, whole: bool = False) -> FrameState:
-    """Return the state with exposures moved back into `shot` if its edges are "slide".
+    """Return the state with exposures moved into the shot if its edges are "slide", else the state itself.
 
     Each shutter moves only as far as it has to. An exposure that is longer than the shot covers it and goes beyond.
 
     Args:
-        whole: Move the window even if no bars move, since trails may become as long as it is. Otherwise it moves only
-            with bars that need the room.
+        state: The state.
+        index: The shown source frame.
+        direction: As for `positions`.
+        shot: The source frames of the shot.
+        whole: Move the window even if no bars have to move, since trails may become as long as it is.
     """
     options = state.options
     first, last_filmed = origin(options, index, direction), (shot.stop - 1) // options.step * options.step
@@ -60,19 +71,22 @@ def slid(state: FrameState, index: int, direction: int, shot: range, *, whole: b
 
 
 def _filmed(span: tuple[int, int], options: Options) -> tuple[int, int]:
-    """Extend a span of the window's frames to whole filmed frames, since bars move by these."""
+    """Extend a span of the window (first frame, one past the last) to whole filmed frames, since bars move by these."""
     start, stop = span
     return start - start % options.step, min(stop + -stop % options.step, options.window)
 
 
 def source_frames(options: Options, positions: np.ndarray, shot: range) -> np.ndarray:
-    """Return the frames that a window shows at `positions`; −1: none.
+    """Return the source frame that a window shows at each of its positions; −1 for none.
 
-    Past the ends, "hold" and "slide" repeat the last frame, and "mirror" plays back from it without repeating it.
-    "shorten" leaves frames out, but keeps the nearest if all are outside.
+    Beyond the shot's ends, "hold" and "slide" repeat its first or last frame, and "mirror" plays back from there
+    without repeating it. "shorten" leaves frames out, unless all are beyond: then it repeats the first or last frame,
+    too.
 
     Args:
-        shot: range(count) for a whole clip, or the frames between two of its cuts.
+        options: Of the state.
+        positions: From `positions`, any of them.
+        shot: The source frames between two cuts, or range(count) for a whole clip.
     """
     first, count = shot.start, len(shot)
     held = np.minimum(np.maximum(positions, first), shot.stop - 1)  # faster than np.clip for short arrays
@@ -85,5 +99,12 @@ def source_frames(options: Options, positions: np.ndarray, shot: range) -> np.nd
 
 
 def indices(options: Options, index: int, shot: range, direction: int = 1) -> np.ndarray:
-    """Return source frames (L,) of the window around source frame `index`; −1: left out. Arguments as above."""
+    """Return the source frames (L,) that can be exposed when a frame is shown; −1 for those that are left out.
+
+    Args:
+        options: Of the state.
+        index: The shown source frame.
+        shot: As for `source_frames`.
+        direction: As for `positions`.
+    """
     return source_frames(options, positions(options, index, direction), shot)

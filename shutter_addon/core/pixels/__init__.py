@@ -1,1 +1,1 @@
-"""How pictures are made, exactly and in float64: the reference of every device."""
+"""How pictures are computed, exactly and in float64: the reference with which every device is compared."""

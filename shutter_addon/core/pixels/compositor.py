@@ -1,4 +1,4 @@
-"""The reference compositor: every pixel's own shutter, exact, in float64, frame by frame.
+"""The reference compositor: every pixel is exposed by its own shutter, exactly, in float64, frame by frame.
 
 Frames are averaged, or combined otherwise (frame_state.Combine). With wₖ the weight of a frame, 0 to 1 (`counts`), and
 Vₖ its light with alpha aₖ, both premultiplied:
@@ -27,10 +27,13 @@ MIDDLE = 1 / 8192
 
 
 class Sample(NamedTuple):
-    """A visible frame: its premultiplied light (H, W, 4), and its weight (H, W).
+    """A frame that contributes to a picture of lightest, darkest or median.
 
     Attributes:
-        shown: The light of the shown frame regardless of weights; None for other frames.
+        light: (H, W, 4), premultiplied, as each pixel sees the frame.
+        weight: (H, W), how much the frame counts at each pixel.
+        shown: For the shown frame, its light (H, W, 4), which counts without regard to weights if there is a threshold;
+            None for other frames.
     """
 
     light: np.ndarray
@@ -39,11 +42,17 @@ class Sample(NamedTuple):
 
 
 def counts(combine: Combine, bars: ArrayLike, coefficients: ArrayLike, interpolation: str) -> np.ndarray:
-    """Return the weights of frames (…, L) for pixels with coefficients (…, N).
+    """Return how much each frame of the window counts for pixels: weights (…, L) for lightest, darkest or median.
 
     For a median these are the normalised interpolated bars. For lightest and darkest they are from 0 to 1: by
-    displacement the same times Σ cᵢ / (the highest of shutter i's), so that equal bars have weight 1; by value
-    Σ cᵢ (shutter i's bars / its highest).
+    displacement the same times Σ cᵢ / (the highest of shutter i's), so that equal bars have weight 1; by value Σ cᵢ
+    (shutter i's bars / its highest).
+
+    Args:
+        combine: How frames are combined.
+        bars: (N, L).
+        coefficients: (…, N), how much of each shutter a pixel gets.
+        interpolation: Options.interpolation.
     """
     bars, coefficients = np.atleast_2d(np.asarray(bars, dtype=np.float64)), np.asarray(coefficients, dtype=np.float64)
     normalised = bars / bars.sum(axis=1, keepdims=True)
@@ -57,10 +66,14 @@ def counts(combine: Combine, bars: ArrayLike, coefficients: ArrayLike, interpola
 
 
 def of_samples(combine: Combine, samples: Sequence[Sample], *, encoded: bool = False) -> np.ndarray:
-    """Return the premultiplied picture (H, W, 4) of at least one frame; black where all weights are 0.
+    """Return the lightest, darkest or median of frames: a premultiplied picture (H, W, 4).
+
+    It is black where all weights are 0.
 
     Args:
-        encoded: Whether light is encoded (Options.light).
+        combine: How frames are combined.
+        samples: The frames, at least one.
+        encoded: Whether their light is encoded (Options.light).
     """
     if combine.mode == "median":
         return median(samples)
@@ -87,7 +100,11 @@ def of_samples(combine: Combine, samples: Sequence[Sample], *, encoded: bool = F
 
 
 def _counted(combine: Combine, sample: Sample, encoded: bool) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return the lights of a frame with their weights; with a threshold, the shown frame always counts."""
+    """Return (light, weight) of a frame for each time that it counts.
+
+    Without a threshold, that is once. A threshold lowers the weight where the light does not pass it, and the shown
+    frame also counts in full.
+    """
     if combine.threshold is None:
         return [(sample.light, sample.weight)]
     color = light.straight(sample.light)[..., :3]
@@ -99,11 +116,12 @@ def _counted(combine: Combine, sample: Sample, encoded: bool) -> list[tuple[np.n
 
 
 def _luminance(value: np.ndarray) -> np.ndarray:
+    """Return the luminance (H, W) of light (H, W, 3); −∞ where no frame has counted yet."""
     return np.where(np.isinf(value[..., 0]), -np.inf, np.nan_to_num(value, neginf=0.0) @ light.REC709)
 
 
 def passes(combine: Combine, luminance: np.ndarray) -> np.ndarray:
-    """Return how much of light with a linear luminance (…) leaves a trail, 0 to 1."""
+    """Return how much light of a luminance (…) passes the threshold of `combine` and leaves a trail, 0 to 1."""
     half = max(combine.softness, 1e-6) / 2
     t = np.clip((luminance - ((combine.threshold or 0.0) - half)) / (2 * half), 0, 1)
     t = t * t * (3 - 2 * t)
@@ -111,7 +129,7 @@ def passes(combine: Combine, luminance: np.ndarray) -> np.ndarray:
 
 
 def median(samples: Sequence[Sample]) -> np.ndarray:
-    """Return the median (H, W, 4) of each channel."""
+    """Return the weighted median of frames for each channel: a premultiplied picture (H, W, 4)."""
     straight, weights = light.straight(np.stack([s.light for s in samples])), np.stack([s.weight for s in samples])
     alphas = weights * straight[..., 3]
     cover = (alphas.sum(axis=0) / np.maximum(weights.sum(axis=0), 1e-30))[..., None]
@@ -120,9 +138,13 @@ def median(samples: Sequence[Sample]) -> np.ndarray:
 
 
 def weighted_median(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Return the weighted median of values (L, …): the first where the cumulated weight reaches half, less MIDDLE.
+    """Return the weighted median (…) of values (L, …): the first value at which the sum of weights so far reaches half.
 
-    Within MIDDLE of half it is mixed with the next value, equally at exactly half.
+    If it is within MIDDLE of half there, the median is a mix with the next value: equal parts at exactly half.
+
+    Args:
+        values: (L, …).
+        weights: (L, …), at least 0.
     """
     order = np.argsort(np.where(weights > 0, values, np.inf), axis=0, kind="stable")
     values, weights = (np.take_along_axis(a, order, axis=0) for a in (values, weights))
@@ -149,7 +171,12 @@ Moves = tuple[np.ndarray, np.ndarray]
 
 
 def mixed_shutter(state: FrameState, coefficients: ArrayLike) -> np.ndarray:
-    """Return the bars (…, L) of the shutter that exposes pixels with coefficients (…, N), Σ = 1."""
+    """Return the bars (…, L) of the shutter that a pixel has as a mix of all shutters.
+
+    Args:
+        state: The effect at a frame, with N shutters.
+        coefficients: How much of each shutter pixels get, (…, N); the sum is 1.
+    """
     mixed, c = shutters.INTERPOLATIONS[state.options.interpolation], np.asarray(coefficients, dtype=np.float64)
     total = np.zeros((*c.shape[:-1], state.bars.shape[1]))
     for chosen, share, own in ways(state, np.moveaxis(c, -1, 0)):
@@ -158,14 +185,14 @@ def mixed_shutter(state: FrameState, coefficients: ArrayLike) -> np.ndarray:
 
 
 def ways(state: FrameState, coefficients: np.ndarray) -> Iterator[tuple[list[int], np.ndarray, np.ndarray]]:
-    """Yield the shutters of each way to combine frames (*Combine*).
+    """Yield the shutters that combine frames in the same way (*Combine*), for one way after another.
 
     Args:
         state: The effect at a frame.
         coefficients: Of all shutters, (N, …) ≥ 0.
 
     Yields:
-        The indices of n shutters, the sum of their coefficients, and these scaled to a sum of 1, (n, …).
+        The indices of n shutters, the sum (…) of their coefficients, and these divided by the sum, (n, …).
     """
     for chosen in map(list, state.groups.values()):
         share = coefficients[chosen].sum(axis=0)
@@ -181,16 +208,17 @@ def compose(
     moves: Moves | None = None,
     sharp: bool | None = None,
 ) -> np.ndarray:
-    """Return the picture (H, W, 4) float64, scene-linear and premultiplied.
+    """Return the picture (H, W, 4) float64 that the effect makes of a window of frames, scene-linear and premultiplied.
 
-    F = e(q) · ∫ V(t + ⌊Q⁻¹(z)⌋) dz (§3.1, §3.4.1), or the combination of `of_samples`. Shutters that combine
-    frames in different ways make a picture for each way, mixed by the coefficients.
+    F = e(q) · ∫ V(t + ⌊Q⁻¹(z)⌋) dz (§3.1, §3.4.1), or the combination of `of_samples`. Shutters that combine frames in
+    different ways make a picture for each way; the coefficients mix these.
 
     Args:
+        state: The effect at this frame, with N shutters of L bars.
         frames: L pictures (H, W, 4), scene-linear, premultiplied.
         present: (L,) bool, False for left out frames, whose share goes to the others. If none has a share, it goes to
             the nearest present frame, preferring the earlier one.
-        coefficients: (N, H, W), Σ = 1.
+        coefficients: (N, H, W), how much of each shutter a pixel gets; their sum is 1.
         moves: Turns and shifts (L, N) of frames for shutters (FrameState.following). A frame is sampled at Σ cᵢ Wᵢ(x)
             instead of x, or by value interpolation at each Wᵢ(x) and mixed. None: nothing is followed.
         sharp: How `seen` samples frames; None: sharp if all of them are opaque.
@@ -232,7 +260,7 @@ def compose(
 
 
 def _counted_weight(combine: Combine, samples: list[Sample]) -> np.ndarray:
-    """Return the sum of all frames' weights (H, W)."""
+    """Return the sum (H, W) of the weights of all frames; 1 where a threshold lets the shown frame count in full."""
     if combine.threshold is not None and any(sample.shown is not None for sample in samples):
         return np.ones(samples[0].weight.shape)
     return sum((sample.weight for sample in samples), np.zeros(samples[0].weight.shape))
@@ -246,7 +274,15 @@ def _samples(
     moves: Moves | None,
     looks_at: Callable[[int], list[np.ndarray]],
 ) -> list[Sample]:
-    """Return the present frames. A frame seen by several motions is mixed by its weight for each."""
+    """Return the Samples of frames that are present and count for some pixel.
+
+    If shutters follow several motions, a pixel sees a frame in several places. These are mixed by the weight of each.
+
+    Args:
+        combine: How frames are combined.
+        state, coefficients, present, moves: As for `compose`.
+        looks_at: Returns the frame of an index, as seen by each of `_motions`.
+    """
     options, bars = state.options, state.bars
     if moves is not None and options.interpolation == "value":
         alone = np.stack([counts(combine, row, np.ones(1), options.interpolation) for row in bars])
@@ -269,7 +305,10 @@ def _samples(
 
 
 def _motions(state: FrameState, coefficients: np.ndarray, moves: Moves | None) -> list[Moves | None]:
-    """Return the motions by which frames are seen: each shutter's for value interpolation, else the pixels' mix."""
+    """Return the motions by which pixels see frames: turns and shifts (L, H, W), or None where nothing is followed.
+
+    By value interpolation there is one for each shutter, else one that mixes those of the shutters in each pixel.
+    """
     if moves is None:
         return [None]
     turns, shifts = moves
@@ -279,7 +318,10 @@ def _motions(state: FrameState, coefficients: np.ndarray, moves: Moves | None) -
 
 
 def _exposed(state: FrameState, coefficients: np.ndarray, present: np.ndarray, moves: Moves | None) -> np.ndarray:
-    """Return the weights (M, H, W, L) of frames in the sum, as seen by each of `_motions`."""
+    """Return the weights (M, H, W, L) with which frames are summed, for each of the M motions by which pixels see them.
+
+    Arguments as for `compose`.
+    """
     normalised = state.bars / state.bars.sum(axis=1, keepdims=True)
     if moves is not None and state.options.interpolation == "value":
         return _without_absent(coefficients[..., None] * normalised[:, None, None], coefficients, present)
@@ -289,11 +331,13 @@ def _exposed(state: FrameState, coefficients: np.ndarray, present: np.ndarray, m
 
 
 def seen(frame: np.ndarray, places: np.ndarray, *, sharp: bool) -> np.ndarray:
-    """Sample a frame (H, W, C) at places (…), x + iy as in motions.Similarity; return (…, C).
+    """Sample a frame (H, W, C) at places (…), x + iy in pixels as in motions.Similarity. Return the samples (…, C).
 
     Beyond its edges the frame repeats its last pixels.
 
     Args:
+        frame: The frame.
+        places: The places.
         sharp: By Catmull-Rom's cubic, clamped to the four pixels around to avoid ringing. Otherwise linearly, as
             colours with alpha need.
     """
@@ -312,7 +356,12 @@ def seen(frame: np.ndarray, places: np.ndarray, *, sharp: bool) -> np.ndarray:
 
 
 def _weights(t: np.ndarray, sharp: bool) -> dict[int, np.ndarray]:
-    """Return the weights of the pixels at −1, 0, 1 and 2, or of those at 0 and 1, for a place between 0 and 1."""
+    """Return the weights of the pixels around a place, by their distance: −1, 0, 1 and 2 (sharp), or 0 and 1.
+
+    Args:
+        t: How far the place is beyond pixel 0 towards pixel 1, 0 to 1, for any number of places.
+        sharp: As for `seen`.
+    """
     if not sharp:
         return {0: 1 - t, 1: t}
     return {
@@ -324,9 +373,12 @@ def _weights(t: np.ndarray, sharp: bool) -> dict[int, np.ndarray]:
 
 
 def _without_absent(q: np.ndarray, parts: np.ndarray, present: np.ndarray) -> np.ndarray:
-    """Return weights q (M, H, W, L) with the share of absent frames given to the others.
+    """Return weights (M, H, W, L) in which the share of absent frames has gone to the present ones.
 
-    If the others have no share, the nearest frame gets the parts (M, H, W).
+    Args:
+        q: The weights of all frames, (M, H, W, L).
+        parts: (M, H, W), what the nearest present frame gets if none has a share.
+        present: (L,) bool.
     """
     if present.all():
         return q
@@ -340,4 +392,5 @@ def _without_absent(q: np.ndarray, parts: np.ndarray, present: np.ndarray) -> np
 
 
 def _decode(total: np.ndarray) -> np.ndarray:
+    """Convert premultiplied RGBA (…, 4) of encoded light to linear light."""
     return light.premultiplied(light.straight(total), light.to_linear)

@@ -1,9 +1,9 @@
-"""Conductances between neighbouring pixels: how freely coefficients spread between them.
+"""Conductances between neighbouring pixels: how freely the coefficients of shutters spread from one to the other.
 
-They are small at edges of the picture, so that scribbles end there. Every cell of a guide has a resistance, from 1
-where it is flat to 1 / FLOOR at an edge, by the steeper of its horizontal and vertical slopes: an edge does not conduct
-along itself, either. Cells can be larger than pixels; resistances are linear between their middles. Two pixels are
-connected by half the resistance of each in series.
+They are small at edges of a picture, the guide, so that the effect of scribbles ends there. Every cell of the guide has
+a resistance, from 1 where it is flat to 1 / FLOOR at an edge, by the steeper of its horizontal and vertical slopes: an
+edge does not conduct along itself, either. Cells can be larger than pixels; resistances are linear between their
+middles. Two pixels are connected by half the resistance of each in series.
 """
 
 import numpy as np
@@ -19,11 +19,12 @@ STEPS = 1 << 10
 
 
 def resistances(guide: np.ndarray, strength: float) -> np.ndarray:
-    """Return resistances (h, w) float32 of cells, in 1 … 1 / FLOOR.
+    """Return the resistances (h, w) float32 of a guide's cells, from 1 to 1 / FLOOR.
 
     Args:
-        guide: (h, w, 3 or more), finite: display colours, 0 … 1, times the picture's scale; three channels count.
-        strength: 0 … 1; 0 gives 1 everywhere, 1 the full contrast.
+        guide: (h, w, 3 or more), finite: display colours, 0 … 1, times the rows of cells over 240 (compute/guide.py);
+            three channels count.
+        strength: 0 … 1, how strictly scribbles stop at edges; 0 gives 1 everywhere, 1 the full contrast.
     """
     colours = np.pad(np.asarray(guide)[..., :3].astype(np.float32), ((1, 1), (1, 1), (0, 0)), mode="edge")
     across, down = colours[1:-1, 2:] - colours[1:-1, :-2], colours[2:, 1:-1] - colours[:-2, 1:-1]
@@ -33,13 +34,23 @@ def resistances(guide: np.ndarray, strength: float) -> np.ndarray:
 
 
 def cell_side(cells: tuple[int, int], pixels: tuple[int, int]) -> int:
-    """Return the side of a cell in pixels, a power of two; `cells` and `pixels` are (rows, columns)."""
+    """Return the side of a guide's cells in pixels, a power of two.
+
+    Args:
+        cells: The rows and columns of the guide.
+        pixels: The rows and columns of the picture.
+    """
     sides = (1 << k for k in range(16))
     return next(side for side in sides if all(-(-n // side) == count for n, count in zip(pixels, cells, strict=True)))
 
 
 def of_pixels(cells: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """Interpolate values (h, w) of cells linearly at each pixel of a picture with shape (rows, columns)."""
+    """Interpolate the values (h, w) of a guide's cells linearly for each pixel of a picture.
+
+    Args:
+        cells: The values.
+        shape: The picture's (rows, columns).
+    """
     side = cell_side(cells.shape, shape)
     for axis, length in enumerate(shape):
         place = ((np.arange(length) + 0.5) / side - 0.5).clip(0, cells.shape[axis] - 1)
@@ -51,11 +62,14 @@ def of_pixels(cells: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
 
 
 def conductances(guide: np.ndarray, strength: float, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-    """Return conductances to the right neighbour (h, w − 1) and to the one below (h − 1, w), float64 in FLOOR … 1.
+    """Return the conductances between each pixel and its right neighbour, and between each and the one below.
 
     Args:
         guide, strength: As for `resistances`.
-        shape: (h, w) pixels; a cell of the guide is one pixel, or 2 × 2, 4 × 4, …
+        shape: The picture's (h, w) pixels; a cell of the guide is one pixel, or 2 × 2, 4 × 4, …
+
+    Returns:
+        (h, w − 1) and (h − 1, w) float64, from FLOOR to 1.
     """
     pixels = of_pixels(resistances(guide, strength).astype(np.float64), shape)
     return 2 / (pixels[:, 1:] + pixels[:, :-1]), 2 / (pixels[1:] + pixels[:-1])

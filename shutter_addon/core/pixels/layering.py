@@ -1,4 +1,4 @@
-"""Layers: regions that are exposed by their own shutter in front of everything else.
+"""Layers: regions that are exposed by their own shutter, by themselves, and laid over everything else.
 
 With mₖ the matte of a layer in source frame k, hₖ = Π (1 − mₖ) over all layers, q a pixel's shutter by the other
 regions and s the layer's own, both normalised:
@@ -8,11 +8,12 @@ regions and s the layer's own, both normalised:
     F + (1 − A) B               the picture, layer by layer, the farthest first
 
 So layers leave no ghosts. Sums use the light of Options.light and are composed in linear light. Where Σ qₖ hₖ is less
-than CLEAR, too little of B was visible, and a plate fills in.
+than CLEAR, too little of B was visible. A plate, made from frames outside the exposure, fills in.
 
-A pixel V at the edge of a subject is m S + (1 − m) P (`separated`). S and P are first estimated from their
-surroundings. The remaining error of V is then distributed to both by coverage ("Fast Multi-Level Foreground
-Estimation", Germer et al. 2020, and "blur fusion", Forte 2021): twice, from wide and from near surroundings.
+A pixel V at the edge of a subject is m S + (1 − m) P, a mix of the subject's color S and the background's P, which
+`separated` finds. Both are first estimated from their surroundings. The remaining error of V is then distributed to
+both by coverage ("Fast Multi-Level Foreground Estimation", Germer et al. 2020, and "blur fusion", Forte 2021): twice,
+from wide and from near surroundings.
 """
 
 from collections.abc import Sequence
@@ -37,18 +38,24 @@ _CELLS = 4
 
 
 def matte_of(coefficients: ArrayLike) -> np.ndarray:
-    """Return the matte of a drawn layer from its coefficients."""
+    """Return the matte (…), 0 to 1, of a layer of strokes from the coefficients (…) that are diffused from these."""
     values = (np.asarray(coefficients) - NONE) / (WHOLE - NONE)
     return np.clip(values, 0, 1)
 
 
 def behind(mattes: Sequence[np.ndarray]) -> np.ndarray:
-    """Return the visible share of the background behind layers with mattes (h, w): Π (1 − m)."""
+    """Return the visible share (h, w) of the background behind layers with mattes m (h, w): Π (1 − m)."""
     return reduce(np.multiply, [1 - matte for matte in mattes])
 
 
 def with_plate(sums: np.ndarray, clear: np.ndarray, plate: np.ndarray | None) -> np.ndarray:
-    """Return B (H, W, 4) from Σ qₖ hₖ Vₖ (H, W, 4) and Σ qₖ hₖ (H, W), filled by the plate where that is small."""
+    """Return the background B (H, W, 4), filled by a plate where too little of it was exposed.
+
+    Args:
+        sums: Σ qₖ hₖ Vₖ, (H, W, 4).
+        clear: Σ qₖ hₖ, (H, W): the share of the exposure that shows the background.
+        plate: (H, W, 4), what fills in. None: nothing does.
+    """
     if plate is None:
         return sums / np.maximum(clear, 1e-6)[..., None]
     lacking = np.maximum(CLEAR - clear, 0)[..., None]
@@ -56,9 +63,14 @@ def with_plate(sums: np.ndarray, clear: np.ndarray, plate: np.ndarray | None) ->
 
 
 def separated(colors: np.ndarray, matte: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the colours (H, W, C) float32 of a subject and of its background, from linear light.
+    """Separate the colours of a subject and of its background in the mixed pixels at the subject's edge.
 
-    Only mixed pixels of the matte (H, W) change.
+    Args:
+        colors: (H, W, C) float32, linear light.
+        matte: (H, W), the subject's, 0 to 1. Pixels where it is neither 0 nor 1 are mixed.
+
+    Returns:
+        The subject's colours and the background's, (H, W, C) float32. Outside of mixed pixels they are the given ones.
     """
     own, behind = colors.copy(), colors.copy()
     mixed = (matte > 0) & (matte < 1)
@@ -78,13 +90,24 @@ def separated(colors: np.ndarray, matte: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 def _nearer(picture: np.ndarray, matte: np.ndarray, own: np.ndarray, behind: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return subject and background colours (C, …) corrected so that they mix to the picture."""
+    """Return estimated subject and background colours (C, …) corrected so that they mix to the picture's.
+
+    Args:
+        picture: The exact mixed colours (C, …).
+        matte: (…), 0 to 1.
+        own: The estimate for the subject (C, …).
+        behind: The estimate for the background (C, …).
+    """
     left = picture - matte * own - (1 - matte) * behind
     return own + matte * left, behind + (1 - matte) * left
 
 
 def _around(mixed: np.ndarray, reach: int) -> slice:
-    """Return the rows, or columns, from the first to the last mixed pixel, extended by `reach`."""
+    """Return the range of rows (or columns) from the first to the last mixed one, extended by `reach` at both ends.
+
+    Args:
+        mixed: Which of them have mixed pixels, bool (n,).
+    """
     places = np.flatnonzero(mixed)
     return slice(max(int(places[0]) - reach, 0), int(places[-1]) + reach + 1)
 
@@ -92,10 +115,17 @@ def _around(mixed: np.ndarray, reach: int) -> slice:
 def _surroundings(
     own: np.ndarray, behind: np.ndarray, matte: np.ndarray, radius: int, places: Sequence[np.ndarray]
 ) -> list[np.ndarray]:
-    """Return means (C, …) around pixels of subject colours (C, h, w), weighted by a matte (h, w), and of the others.
+    """Return mean colours around pixels: of the subject, weighted by its matte, and of the background, by the rest.
 
     Args:
-        places: rows and columns of the pixels
+        own: The subject's colours (C, h, w).
+        behind: The background's colours (C, h, w).
+        matte: (h, w).
+        radius: How far the means go, in pixels.
+        places: Rows and columns of the pixels.
+
+    Returns:
+        Two arrays (C, …) float32.
     """
     cell = max(radius // _CELLS, 1)
     rows, columns = (place // cell for place in places)
@@ -107,14 +137,19 @@ def _surroundings(
 
 
 def _cells(planes: np.ndarray, size: int) -> np.ndarray:
-    """Return sums (C, ⌈h/size⌉, ⌈w/size⌉) over squares of pixels, with nothing beyond the edges."""
+    """Return sums (C, ⌈h/size⌉, ⌈w/size⌉) over squares of size × size pixels of planes (C, h, w)."""
     if size == 1:
         return planes
     return np.moveaxis(block_sums(np.moveaxis(planes, 0, -1), size, np.float32, beyond="constant"), -1, 0)
 
 
 def _box_sums(values: np.ndarray, radius: int) -> np.ndarray:
-    """Return sums (C, h, w) float64 over squares of 2 · radius + 1 cells, with nothing beyond the edges."""
+    """Return for each cell of values (C, h, w) the sum over the square of cells around it, as float64.
+
+    Args:
+        values: The cells. Beyond the edges there are zeros.
+        radius: How many cells the square has on each side of the cell.
+    """
     for axis in (1, 2):
         pads = [(0, 0)] * 3
         pads[axis] = radius + 1, radius

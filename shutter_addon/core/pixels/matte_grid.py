@@ -1,4 +1,4 @@
-"""Fitting mattes to the picture's pixels: scaling, feathering, means of blocks; and other separable filters."""
+"""Fit mattes to the picture's pixels: scale, feather, average blocks. And other filters by rows and columns."""
 
 import math
 from typing import Literal
@@ -15,7 +15,7 @@ _ROWS = 32  # rows at a time, which fit into a processor's cache
 
 
 def fitted(values: np.ndarray, width: int, height: int) -> np.ndarray:
-    """Scale a matte to fit into the middle of a picture, with its aspect and black around it.
+    """Return a matte, scaled to fit into the middle of a picture with its aspect kept and black around it.
 
     A pixel is the mean of what it covers where the matte is reduced, and linearly interpolated where it is enlarged. A
     pixel on the matte's edge is black in proportion. A matte of the right size is returned itself.
@@ -32,7 +32,7 @@ def fitted(values: np.ndarray, width: int, height: int) -> np.ndarray:
 
 
 def feathered(values: np.ndarray, width: float) -> np.ndarray:
-    """Blur values (h, w) float32 with a Gaussian that spreads a hard edge over `width` pixels.
+    """Return values (h, w) float32, 0 … 1, blurred by a Gaussian that spreads a hard edge over `width` pixels.
 
     Beyond the picture its edges continue. With width 0, the values are returned themselves.
     """
@@ -76,26 +76,43 @@ def block_sums(
 
 
 def _resampled(values: np.ndarray, down: Taps, across: Taps) -> np.ndarray:
+    """Return values (h, w) resampled along rows and columns.
+
+    Args:
+        values: The values.
+        down: The taps that make the new rows.
+        across: The taps that make the new columns.
+    """
     if len(across[0]) > values.shape[1]:  # transpose while it is small
         return _weighted(_turned(_weighted(_turned(values), *across)), *down)
     return _turned(_weighted(_turned(_weighted(values, *down)), *across))
 
 
 def blurred(values: np.ndarray, kernel: np.ndarray) -> np.ndarray:
-    """Filter values (h, w) ≤ 1 vertically and horizontally; beyond the picture its edges continue.
+    """Return values (h, w) ≤ 1 filtered with a kernel, vertically and horizontally.
+
+    Beyond the picture its edges continue.
 
     Args:
-        kernel: Weights at distances 0, 1, 2, …
+        values: The values.
+        kernel: Weights at distances 0, 1, 2, … to both sides.
     """
     return _turned(_convolved(_turned(_convolved(values, kernel)), kernel))
 
 
 def _turned(values: np.ndarray) -> np.ndarray:
+    """Return values with rows and columns swapped, in C order."""
     return np.ascontiguousarray(values.T)
 
 
 def _weighted(values: np.ndarray, indices: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Return rows (rows, w) that are weighted sums of rows, at most 1."""
+    """Return rows (n, w) float32 that are weighted sums of the rows of `values` (h, w), at most 1.
+
+    Args:
+        values: The values.
+        indices: Which rows are summed, (n, k).
+        weights: Their weights, (n, k).
+    """
     result = np.empty((len(indices), values.shape[1]), np.float32)
     weights = weights.astype(np.float32)[:, :, None]
     for start in range(0, len(indices), _ROWS):
@@ -110,7 +127,7 @@ def _weighted(values: np.ndarray, indices: np.ndarray, weights: np.ndarray) -> n
 
 
 def _convolved(values: np.ndarray, kernel: np.ndarray) -> np.ndarray:
-    """Filter rows by a kernel (see `blurred`)."""
+    """Return values (h, w) filtered vertically with a kernel, as for `blurred`."""
     reach = len(kernel) - 1
     padded = np.pad(values, ((reach, reach), (0, 0)), "edge")
     result = np.empty_like(values)
@@ -127,7 +144,13 @@ def _convolved(values: np.ndarray, kernel: np.ndarray) -> np.ndarray:
 
 
 def _fit(length: int, size: int, scale: float) -> Taps:
-    """Return taps for `size` pixels of a row that shows `length` scaled pixels in its middle."""
+    """Return the taps (which pixels are summed for each new one, and their weights) of an axis for `fitted`.
+
+    Args:
+        length: The matte's pixels along the axis.
+        size: The picture's.
+        scale: The picture's pixels for each pixel of the matte, which lies in the picture's middle.
+    """
     edges = (np.arange(size + 1) - size / 2) / scale + length / 2
     start, stop = edges[:-1, None], edges[1:, None]
     if scale < 1:
@@ -145,16 +168,22 @@ def _fit(length: int, size: int, scale: float) -> Taps:
 
 
 def _blocks(length: int, block: int) -> Taps:
-    """Return taps for means of blocks of rows; the last block may be smaller."""
+    """Return the taps (which rows are summed, and their weights) for means of blocks of rows.
+
+    The last block may be smaller.
+    """
     indices = np.arange(0, length, block)[:, None] + np.arange(block)
     present = indices < length
     return indices.clip(0, length - 1), present / present.sum(axis=1, keepdims=True)
 
 
 def _gaussian(sigma: float) -> np.ndarray:
-    """Return a blur's weights float32 at distances 0, 1, 2, … pixels.
+    """Return the weights float32 of a Gaussian blur at distances 0, 1, 2, … pixels.
 
     They are the Gaussian's integral over each pixel, so a hard edge becomes the error function.
+
+    Args:
+        sigma: The standard deviation in pixels.
     """
     reach = math.ceil(_REACH * sigma)
     ends = np.array([math.erf((i - 0.5) / (sigma * math.sqrt(2))) for i in range(reach + 2)])
@@ -162,14 +191,20 @@ def _gaussian(sigma: float) -> np.ndarray:
 
 
 def _means(length: int, step: int) -> Taps:
-    """Return taps for cells of `step` pixels, with one more cell at each end that repeats the last pixel."""
+    """Return the taps (which pixels are summed, and their weights) for means of cells of `step` pixels.
+
+    One more cell at each end repeats the last pixel.
+    """
     cells = np.arange(-1, math.ceil(length / step) + 1)[:, None]
     indices = (cells * step + np.arange(step)).clip(0, length - 1)
     return indices, np.full(indices.shape, 1 / step)
 
 
 def _lines(length: int, step: int) -> Taps:
-    """Return taps for pixels that are interpolated linearly between the middles of cells from `_means`."""
+    """Return the taps (which cells are summed, and their weights) for `length` pixels.
+
+    They interpolate linearly between the middles of the cells of `_means`.
+    """
     place = (np.arange(length)[:, None] + 0.5) / step + 0.5
     indices = np.floor(place).astype(int) + np.arange(2)
     return indices, 1 - np.abs(place - indices)
@@ -179,11 +214,11 @@ Box = tuple[slice, slice]  # rows and columns
 
 
 def box_around(cover: np.ndarray, reach: int) -> Box | None:
-    """Return the rows and columns of the box around what a matte (h, w) covers, or None if it covers nothing.
+    """Return the rows and columns of the box around all pixels of a matte (h, w) above 0, or None without any.
 
     Args:
         cover: The matte.
-        reach: Pixels by which the box is larger on each side.
+        reach: Pixels by which the box is larger on each side, within the matte.
     """
     places = [np.flatnonzero(cover.max(axis=axis) > 0) for axis in (1, 0)]
     if not places[0].size:

@@ -1,4 +1,4 @@
-"""Patterns that distinguish shutters without colour; the reference of shaders/show.glsl."""
+"""Patterns on the colors of shutters, for those who cannot tell these apart. shaders/show.glsl draws the same ones."""
 
 from collections.abc import Sequence
 
@@ -11,9 +11,11 @@ _OFF = 0.3  # keeps pixels' middles off the lines' edges, where rounding would d
 
 
 def marks(index: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return where a shutter's pattern has ink: bool, like x and y, in units of the interface, y up.
+    """Return which places have the ink of a shutter's pattern: bool, shaped like x and y.
 
-    The first shutter's pattern is plain. Patterns repeat after COUNT shutters.
+    Args:
+        index: The shutter's. The first one's pattern is plain, and patterns repeat after COUNT shutters.
+        x, y: Places in units of the interface (pixels at 100 %), y up.
     """
     across, up = _within(x, _PERIOD) < _WIDTH, _within(y, _PERIOD) < _WIDTH
     rising, falling = _within(x - y + _OFF, _SLANTED) < _WIDTH, _within(x + y + _OFF, _SLANTED) < _WIDTH
@@ -23,16 +25,22 @@ def marks(index: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 def ink(color: Sequence[float]) -> tuple[float, float, float]:
-    """Return the ink's colour on a colour (3,), both display code values."""
+    """Return the color of a pattern's ink, black or white, on a shutter's color (3,). Both are display code values."""
     luminance = np.dot(color, [0.2126, 0.7152, 0.0722])
     return (1.0, 1.0, 1.0) if luminance < 0.35 else (0.0, 0.0, 0.0)
 
 
 def painted(color: Sequence[float], index: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return a colour (3,) with a pattern at places as for `marks`: (..., 3), display code values."""
+    """Return a shutter's color with its pattern: (..., 3), display code values.
+
+    Args:
+        color: The color (3,).
+        index, x, y: As for `marks`.
+    """
     share = STRENGTH * marks(index, x, y)[..., None]
     return (1 - share) * np.asarray(color) + share * np.array(ink(color))
 
 
 def _within(place: np.ndarray, period: float) -> np.ndarray:
+    """Return how far places are beyond the last multiple of a period."""
     return place - np.floor(place / period) * period

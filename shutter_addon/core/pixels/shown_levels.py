@@ -1,4 +1,4 @@
-"""8-bit levels of scene-linear light as Blender makes them, to the bit, including dither."""
+"""Convert scene-linear light to the 8-bit levels that Blender makes of it, to the bit, including dither."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,22 +11,22 @@ _HASH = np.uint32(1103515245)
 
 @dataclass(frozen=True)
 class Display:
-    """Conversion of light to a file's levels.
+    """The conversion from scene-linear light to 8-bit levels, as Blender does it for a file.
 
     Attributes:
-        dither: Its intensity, ≥ 0.
-        transfer: Converts light float32 of any shape to code values float32, elementwise and to the bit.
+        dither: The intensity of dither, ≥ 0, as in Blender.
+        transfer: Converts light float32 of any shape to code values float32, elementwise and with Blender's bits.
     """
 
     dither: float
     transfer: Callable[[np.ndarray], np.ndarray]
 
     def levels(self, light: np.ndarray, noise: np.ndarray) -> np.ndarray:
-        """Return levels uint8 of light (…, C) float32, with the `noise` (…) of its pixels."""
+        """Return the levels uint8 of light (…, C) float32, with the noise (…) of its pixels added for dither."""
         return rounded(self.transfer(light) + noise[..., None])
 
     def noise(self, width: int, height: int) -> np.ndarray:
-        """Return the noise (height, width) float32, bottom row first, that is added to code values of all channels.
+        """Return the noise of dither (height, width) float32, bottom row first, for the code values of all channels.
 
         It is the same for all frames. Do not modify it.
         """
@@ -35,7 +35,7 @@ class Display:
 
 @lru_cache(2)
 def _noise(width: int, height: int, dither: float) -> np.ndarray:
-    """Return noise for each pixel with a triangular distribution from −1 to 1.
+    """Return the noise of dither for each pixel: triangularly distributed, scaled to code values, bottom row first.
 
     It is the hash iqint3 of the pixel's place (Jarzynski and Olano, Hash Functions for GPU Rendering, 2020).
     """
@@ -50,5 +50,5 @@ def _noise(width: int, height: int, dither: float) -> np.ndarray:
 
 
 def rounded(values: np.ndarray) -> np.ndarray:
-    """Return the nearest levels uint8 of code values float32 of any range."""
+    """Return code values float32 (white is 1) as the nearest levels uint8, clipped to 0 … 255."""
     return (np.float32(255) * np.clip(values, 0, 1) + np.float32(0.5)).astype(np.uint8)

@@ -1,1 +1,1 @@
-"""The effect as a JSON file: reading, checking, writing and editing recipes."""
+"""Recipes, which are effects as JSON files: read, check, write and make them."""

@@ -1,4 +1,4 @@
-"""Converting an effect with sampled channels into a recipe, whose channels have keys.
+"""Export an effect of Blender as a recipe: find keys for its sampled channels.
 
 Sampled numbers are float32. A recipe gets the shortest decimals that give the same float32, and points are rounded to a
 millionth of the picture. So a recipe's numbers survive a round trip with up to seven digits.
@@ -50,13 +50,15 @@ _Fits = Callable[[float, float, float, float], bool]
 
 
 def with_keys(effect: Effect, shown: range, contents: Iterable[FileContent | RampContent] = ()) -> Effect:
-    """Return a recipe's effect for an effect that is shown at some frames, the first of which is the recipe's frame 1.
+    """Return an effect in the form that recipes have, with keys instead of sampled channels.
 
-    Channels are sampled at these frames, at their keys and at drawings. The result leaves out regions without strokes
-    and drawings before the first with strokes. Widths and options are constant, as at the first frame.
+    Regions without strokes are left out, and so are drawings before the first with strokes. Widths and options are
+    constant, as at the first frame.
 
     Args:
-        contents: The recipe's contents of matte regions, without outlines.
+        effect: The effect, with channels that are sampled at the frames `shown`, at their keys and at drawings.
+        shown: The timeline frames at which it is shown. The first is the recipe's frame 1.
+        contents: The recipe's contents of matte regions, in order, without those of outlines and subjects.
 
     Raises:
         EffectError: The effect cannot be rendered.
@@ -65,8 +67,8 @@ def with_keys(effect: Effect, shown: range, contents: Iterable[FileContent | Ram
     names: list[str] = []
     for shutter in effect.shutters:
         names.append(_free(shutter.name, names))  # regions refer to the first of repeated names
-    called, words = _region_names(effect), iter(contents)
-    made = [_region(region, name, words, shown) for region, name in zip(effect.regions, called, strict=True)]
+    called, given = _region_names(effect), iter(contents)
+    made = [_region(region, name, given, shown) for region, name in zip(effect.regions, called, strict=True)]
     camera = Camera(moves=_moves(effect.camera, {}, shown), **_said(effect.camera, shown))
     # Without strokes, a region does not move anything.
     followed = {id(old): new for old, new in zip(effect.regions, made, strict=True)} | {id(effect.camera): camera}
@@ -86,14 +88,17 @@ def with_keys(effect: Effect, shown: range, contents: Iterable[FileContent | Ram
 
 
 def _free(name: str, taken: Collection[str]) -> str:
-    """Return the name, with the first number that makes it unique."""
+    """Return the name, with the first number after it that makes it differ from the names in `taken`."""
     ends = itertools.chain([""], (f" {number}" for number in itertools.count(2)))
     numbered = (name[: limits.MAX_NAME - len(end)] + end for end in ends)
     return next(each for each in numbered if each not in taken)
 
 
 def _region_names(effect: Effect) -> list[str]:
-    """Return the regions' names, unique for regions that shutters follow and different from the camera's."""
+    """Return names for an effect's regions, under which shutters can follow them.
+
+    Names of followed regions become unique, and different from the word for the camera.
+    """
     followed = [shutter.follow for shutter in effect.shutters if shutter.follow]
     names = [region.name for region in effect.regions]
     for i, region in enumerate(effect.regions):
@@ -106,7 +111,16 @@ def _region_names(effect: Effect) -> list[str]:
 def _shutter(
     effect: Effect, index: int, name: str, follow: Subject | None, interpolation: Interpolation, shown: range
 ) -> Shutter:
-    """Return a shutter with the recipe's keys."""
+    """Return the shutter with an index as a recipe has it, with keys.
+
+    Args:
+        effect: The effect.
+        index: The shutter's index.
+        name: Its name in the recipe.
+        follow: What it follows in the recipe.
+        interpolation: Options.interpolation.
+        shown: As for `with_keys`.
+    """
     shutter = effect.shutters[index]
     said = _said(shutter, shown)
     red, green, blue = (_short(component) for component in shutter.color)
@@ -115,7 +129,10 @@ def _shutter(
 
 
 def _said(part: Any, shown: range) -> dict[str, Any]:
-    """Return a part's fields as a recipe has them: keys or constants over the frames `shown`."""
+    """Return the properties of an effect, shutter, region or camera as a recipe has them: with keys, or constant.
+
+    They are by the names of the model's attributes.
+    """
     said: dict[str, Any] = {}
     for name, each in fields_of(part.__class__).items():
         value = getattr(part, name)
@@ -127,6 +144,7 @@ def _said(part: Any, shown: range) -> dict[str, Any]:
 
 
 def _bars(effect: Effect, index: int, interpolation: Interpolation, shown: range) -> Bars:
+    """Return the bars of the shutter with an index as a recipe has them: with keys, or constant."""
     sampled = effect.shutters[index].bars
 
     @cache
@@ -152,22 +170,30 @@ def _bars(effect: Effect, index: int, interpolation: Interpolation, shown: range
 
 
 def _keyed(eased: _Eased, value: Callable[[float], Any], shown: range) -> Keys:
-    """Return keys at these frames; `value` gives the value at a timeline frame."""
+    """Return a channel with keys of a recipe.
+
+    Args:
+        eased: Timeline frames and eases of the keys.
+        value: Returns the value at a timeline frame.
+        shown: As for `with_keys`.
+    """
     frames, eases = zip(*eased, strict=True)
     return Keys(tuple(_frame(frame, shown) for frame in frames), tuple(map(value, frames)), eases)
 
 
 def _time(time: Channel, shown: range) -> SourceTime:
+    """Return the channel of source time as a recipe has it, with keys."""
     keys = _number_keys(lambda frame: time.at(frame)[0], time, shown)
     return SourceTime(keys, tuple(zip(keys.frames, keys.eases, strict=True)))
 
 
 def _number_keys(at: Callable[[float], float], channel: Channel, shown: range) -> Keys:
-    """Return the keys of a number.
+    """Return a channel with the keys of a number.
 
     Args:
-        at: Gives its value at a frame.
-        channel: The channel that was sampled.
+        at: Returns its value at a timeline frame.
+        channel: The channel of the effect; if it is sampled, it has the keys to begin with.
+        shown: As for `with_keys`.
     """
     # float32 has no more digits for large numbers.
     fits = _straight(lambda frame: np.array(at(frame)), lambda largest: max(TOLERANCE, 2e-6 * float(largest)))
@@ -178,10 +204,11 @@ def _number_keys(at: Callable[[float], float], channel: Channel, shown: range) -
 
 
 def _straight(at: Callable[[float], np.ndarray], allowed: Callable[[np.ndarray], ArrayLike]) -> _Fits:
-    """Return a function that tells whether numbers are linear between keys (see `_keys`).
+    """Return a function for `_keys` that tells whether numbers are right if they are linear between two keys.
 
     Args:
-        allowed: Gives the allowed error for the larger values of the two keys.
+        at: Returns the exact numbers at a timeline frame.
+        allowed: Returns the allowed error for the larger absolute values of the two keys.
     """
 
     def fits(first: float, second: float, frame: float, share: float) -> bool:
@@ -195,7 +222,14 @@ def _straight(at: Callable[[float], np.ndarray], allowed: Callable[[np.ndarray],
 def _region(
     region: Region | MatteRegion, name: str, contents: Iterator[FileContent | RampContent], shown: range
 ) -> Region | MatteRegion | None:
-    """Return a region with the recipe's keys, or None if nothing is drawn."""
+    """Return a region as a recipe has it, with keys, or None if nothing is drawn of it.
+
+    Args:
+        region: The region.
+        name: Its name in the recipe.
+        contents: The remaining contents of the recipe's matte regions; one of them is taken for a matte or ramp.
+        shown: As for `with_keys`.
+    """
     said = _said(region, shown) | {"name": name}
     if isinstance(region, MatteRegion) and not isinstance(region, OutlineRegion | SubjectRegion):
         return replace(region, content=next(contents), moves=_moves(region, {}, shown), **said)
@@ -204,24 +238,30 @@ def _region(
     drawn = marks["outlines" if is_subject else "drawings"]
     if not (marks["drawings"] or drawn):
         return None
-    words: dict[float, Ease] = {}
+    fixed: dict[float, Ease] = {}
     if is_subject and region.moves.are_keyed:
-        words = dict.fromkeys(drawn, "linear")
+        fixed = dict.fromkeys(drawn, "linear")
     elif len(drawn) > 1 and not is_subject:
         # A drawing's ease to the next is independent of the region's keys.
         eases = dict(zip(region.drawings.frames, region.drawings.eases, strict=True))
-        words = {number: eases[number] for number in drawn}
+        fixed = {number: eases[number] for number in drawn}
     for each, drawings in marks.items():
         kept = {number: strokes for number, strokes in drawings.items() if strokes or not is_subject}
-        frames, eased = (_frame(number, shown) for number in kept), (words.get(number, "linear") for number in kept)
+        frames, eased = (_frame(number, shown) for number in kept), (fixed.get(number, "linear") for number in kept)
         said[each] = Drawings(name, tuple(frames), tuple(kept.values()), tuple(eased), 1.0)
-    return replace(region, moves=_moves(region, words, shown), **said)
+    return replace(region, moves=_moves(region, fixed, shown), **said)
 
 
-def _moves(moving: Subject, words: Mapping[float, Ease], shown: range) -> Moves:
-    """Return location, rotation and scale with the recipe's keys; `words`: see `_keys`."""
+def _moves(moving: Subject, fixed: Mapping[float, Ease], shown: range) -> Moves:
+    """Return the placement of a region or camera over time as a recipe has it, with keys.
+
+    Args:
+        moving: The region or camera.
+        fixed: As for `_keys`.
+        shown: As for `with_keys`.
+    """
     keys = []
-    for frame, ease in _move_keys(moving, words, shown):
+    for frame, ease in _move_keys(moving, fixed, shown):
         there = moving.placement(frame)
         x, y = map(_short, there.location)
         placed = Placement((x, y), _short_degrees(there.rotation), _short(there.scale))
@@ -229,8 +269,8 @@ def _moves(moving: Subject, words: Mapping[float, Ease], shown: range) -> Moves:
     return Moves.keyed(keys)
 
 
-def _move_keys(moving: Subject, words: Mapping[float, Ease], shown: range) -> _Eased:
-    """Return the frames and eases of the keys of location, rotation and scale; `words`: see `_keys`."""
+def _move_keys(moving: Subject, fixed: Mapping[float, Ease], shown: range) -> _Eased:
+    """Return the frames and eases of the keys of `_moves`, which has the same arguments."""
     moves = moving.moves.location, moving.moves.rotation, moving.moves.scale
     eases: dict[float, Ease] = {}
     sampled = [channel for channel in moves if isinstance(channel, Samples)]
@@ -241,14 +281,17 @@ def _move_keys(moving: Subject, words: Mapping[float, Ease], shown: range) -> _E
     def place(frame: float) -> np.ndarray:
         return motions.as_array([moving.placement(frame)])[0]
 
-    if not (eases or words) and tuple(place(shown.start)) != (0, 0, 0, 1):
+    if not (eases or fixed) and tuple(place(shown.start)) != (0, 0, 0, 1):
         eases = {shown.start: "linear"}
     fits = _straight(place, lambda largest: TOLERANCE * np.maximum(1, largest))
-    return _keys(fits, eases, words, shown) if eases or words or sampled else []
+    return _keys(fits, eases, fixed, shown) if eases or fixed or sampled else []
 
 
 def _drawings(drawings: Drawings, frame: float) -> dict[float, list[np.ndarray]]:
-    """Return strokes as they lie at a frame, by the frames of their drawings, from the first with strokes."""
+    """Return the drawings of a region: strokes (n, 2) as they lie at a frame, by the frames where they were drawn.
+
+    Those before the first one with strokes are left out.
+    """
     result: dict[float, list[np.ndarray]] = {}
     for index, number in enumerate(drawings.frames):
         strokes = drawings.drawing(index, frame)
@@ -257,19 +300,21 @@ def _drawings(drawings: Drawings, frame: float) -> dict[float, list[np.ndarray]]
     return result
 
 
-def _keys(fits: _Fits, eases: Mapping[float, Ease], words: Mapping[float, Ease], shown: range) -> _Eased:
-    """Return frames and eases of the keys that reproduce the effect at every whole frame of the strip.
+def _keys(fits: _Fits, eases: Mapping[float, Ease], fixed: Mapping[float, Ease], shown: range) -> _Eased:
+    """Return frames and eases of keys that give the effect's values at every whole frame of the strip.
 
     Args:
-        fits: Tells whether a share between two keys is right at a frame.
-        eases: Of the channels' keys, by frame.
-        words: Eases that keys must have.
+        fits: Tells whether a value is right: for the two keys' frames, a frame between them, and the share 0 to 1 of
+            the way between the keys' values.
+        eases: The eases of the effect's own keys, by frame.
+        fixed: Frames that have to be keys, such as those of drawings, with the eases that they must have.
+        shown: As for `with_keys`.
     """
-    if not (frames := sorted(eases.keys() | words.keys())):
+    if not (frames := sorted(eases.keys() | fixed.keys())):
         return [(frame, "linear") for frame in shown]
 
     def per_frame(outside: range, held: float) -> list[tuple[float, Ease]]:
-        """Return a key for every frame outside all keys, unless the value at `held` fits."""
+        """Return a key for each frame of `outside`, before or after all keys; none if the value at `held` fits."""
         return [] if all(fits(held, held, frame, 0) for frame in outside) else [(frame, "linear") for frame in outside]
 
     kept = per_frame(range(shown.start, min(math.ceil(frames[0]), shown.stop)), frames[0])
@@ -277,7 +322,7 @@ def _keys(fits: _Fits, eases: Mapping[float, Ease], words: Mapping[float, Ease],
         # Keys may lie a million frames outside the strip.
         between = range(max(math.floor(first) + 1, shown.start), min(math.ceil(second), shown.stop))
         shares = {frame: (frame - first) / (second - first) for frame in between}
-        candidates = (words[first],) if first in words else (eases.get(first, "linear"), *keyframes.EASES)
+        candidates = (fixed[first],) if first in fixed else (eases.get(first, "linear"), *keyframes.EASES)
         for word in candidates:
             if all(fits(first, second, frame, keyframes.eased(share, word)) for frame, share in shares.items()):
                 kept.append((first, word))
@@ -286,22 +331,22 @@ def _keys(fits: _Fits, eases: Mapping[float, Ease], words: Mapping[float, Ease],
             kept.append((first, candidates[0]))
             kept += [(frame, "linear") for frame in shares]
     last = frames[-1]
-    kept.append((last, words.get(last) or eases.get(last, "linear")))
+    kept.append((last, fixed.get(last) or eases.get(last, "linear")))
     return kept + per_frame(range(max(math.floor(last) + 1, shown.start), shown.stop), last)
 
 
 def _short(value: float) -> float:
-    """Return the shortest decimal with the same float32."""
+    """Return the shortest decimal number with the same float32."""
     return float(str(np.float32(value)))
 
 
 def _short_degrees(degrees: float) -> float:
-    """Return the shortest decimal with the same float32 in radians."""
+    """Return the shortest decimal number of degrees whose radians have the same float32."""
     wanted = np.float32(math.radians(degrees))
     numbers = (float(f"{degrees:.{digits}g}") for digits in range(1, 17))
     return next((number for number in numbers if np.float32(np.radians(number)) == wanted), degrees)
 
 
 def _frame(frame: float, shown: range) -> float:
-    """Return a frame as the recipe counts it, in decimals: 31.1 − 30 = 1.1."""
+    """Return the number that a timeline frame has in the recipe, by decimal arithmetic: 31.1 − 30 is exactly 1.1."""
     return float(Decimal(str(np.float32(frame))) - (shown.start - 1))

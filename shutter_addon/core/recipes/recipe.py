@@ -1,6 +1,7 @@
-"""Operations on an effect in the form of a recipe: frame 1 is the strip's first, points are fractions of the picture.
+"""What recipes and their users share: errors, the word for the camera, and the files of mattes.
 
-recipe_file.py reads and writes recipes.
+In an effect from a recipe, frame 1 is the strip's first, and points are fractions of the picture. recipe_file.py reads
+and writes recipes.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from ..model.effect import Effect, FileContent, MatteRegion
 
 
 class RecipeError(UserError, ValueError):
-    """A recipe breaks the format. The message is one sentence that begins with the place."""
+    """A recipe breaks the format. The message is one sentence that begins with the place, like `shutters[1].bars`."""
 
 
 # The name by which a shutter follows the camera.
@@ -22,13 +23,13 @@ CAMERA = "camera"
 
 
 def contents(source: Effect) -> list[FileContent]:
-    """Return the contents of a recipe's mattes that are files."""
+    """Return the matte files that an effect from a recipe names."""
     found = [region.content for region in source.regions if isinstance(region, MatteRegion)]
     return [content for content in found if isinstance(content, FileContent)]
 
 
 def relative(path: Path, folder: Path) -> str:
-    """Return the path of a matte as a recipe in `folder` names it: relative where possible."""
+    """Return the path of a matte file as a recipe in `folder` names it: relative to the folder if that is possible."""
     with suppress(ValueError):  # on another drive
         way = os.path.relpath(path, folder)
         # With linked folders, ".." can lead elsewhere.

@@ -1,4 +1,4 @@
-"""Reading, checking and writing recipes as JSON files."""
+"""Read recipes from JSON files, check them, and write them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,11 @@ if TYPE_CHECKING:
 
 
 def load(path: str | Path) -> model.Effect:
-    """Read the recipe in a JSON file. RecipeError: it cannot be read, or breaks the format."""
+    """Return the effect of the recipe in a JSON file.
+
+    Raises:
+        RecipeError: The file cannot be read, or breaks the format. The message begins with the path.
+    """
     try:
         return parse(_read(Path(path)))
     except OSError as error:
@@ -38,10 +42,11 @@ def load(path: str | Path) -> model.Effect:
 
 
 def _read(path: Path) -> str:
-    """Return a file's text.
+    """Return the text of a recipe's file.
 
     Raises:
-        RecipeError, OSError, ValueError: It cannot be read, or is too large.
+        RecipeError: It is a pipe or a device, or too large.
+        OSError, ValueError: It cannot be read, or is not UTF-8.
     """
     if path.exists() and not (path.is_file() or path.is_dir()):
         # Opening a pipe would wait forever, and a device has no end.
@@ -53,12 +58,17 @@ def _read(path: Path) -> str:
 
 
 def _check_size(text: str | bytes) -> None:
+    """Raise RecipeError for a text that is too large for a recipe."""
     if len(text) > limits.MAX_BYTES:
         raise RecipeError(f"more than {limits.MAX_BYTES // 1_000_000} MB, which no recipe has")
 
 
 def parse(text: str) -> model.Effect:
-    """Read the recipe in a JSON text. RecipeError: one sentence that begins with the place, like `shutters[1].bars`."""
+    """Return the effect of a recipe in JSON.
+
+    Raises:
+        RecipeError: The text breaks the format. The message begins with the place, like `shutters[1].bars`.
+    """
     _check_size(text)
     try:
         data = json.loads(text.removeprefix("\ufeff"), object_pairs_hook=_object, parse_int=_whole)
@@ -83,24 +93,38 @@ def parse(text: str) -> model.Effect:
 
 
 def dump(effect: model.Effect) -> str:
-    """Return a recipe as JSON text that `parse` reads. Fields without meaning are left out."""
+    """Return an effect as the JSON text of a recipe, which `parse` reads. Fields that have no effect are left out.
+
+    Args:
+        effect: With keyed or constant channels, as `parse` and key_fitting.with_keys return it.
+    """
     text = json.dumps(records.recipe_of(effect), indent=1, ensure_ascii=False)
     # People edit these files: keep a list of numbers on one line. The pattern also matches strings, to skip them.
     return re.sub(r'"(?:[^"\\]|\\.)*"|\[[-+.\de,\s]+\]', _on_one_line, text) + "\n"
 
 
 def _on_one_line(match: re.Match) -> str:
+    """Return the matched list of numbers on one line, or the matched string as it is."""
     text = match[0]
     return text if text[0] == '"' else " ".join(text.split()).replace("[ ", "[").replace(" ]", "]")
 
 
 def save(effect: model.Effect, path: str | Path) -> None:
-    """Write a recipe, whole or not at all. OSError: it cannot be written."""
+    """Write an effect as a recipe's file, whole or not at all.
+
+    Args:
+        effect: As for `dump`.
+        path: The file.
+
+    Raises:
+        OSError: It cannot be written.
+    """
     with atomic_write.writing(Path(path)) as part:
         part.write_text(dump(effect), encoding="utf-8")
 
 
 def _object(pairs: list) -> dict:
+    """Return a JSON object's fields as a dict. Raise RecipeError if one is given twice."""
     fields = dict(pairs)
     if len(fields) < len(pairs):
         twice = Counter(name for name, _ in pairs).most_common(1)[0][0]
@@ -114,6 +138,7 @@ def _whole(digits: str) -> int | float:
 
 
 def _number(value: Any, _kind: Any) -> float:
+    """Return a value of the JSON as a float. Raise ValueError if it is not a finite number."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ValueError(f"{shown(value)} is not a number")
     if not math.isfinite(value):
@@ -122,7 +147,11 @@ def _number(value: Any, _kind: Any) -> float:
 
 
 def _within(converter: Converter, value: Any, kind: Any) -> Any:
-    """Structure a number, a text or a list of a limited range or length."""
+    """Convert a number, text or list of the JSON whose type has a range (records.Within). This is a hook of cattrs.
+
+    Raises:
+        ValueError: The number, or the length of the text or list, is out of the range.
+    """
     inner, (least, most, empty) = get_args(kind)
     made = converter.structure(value, inner)
     if isinstance(made, str | list):
@@ -138,7 +167,10 @@ def _within(converter: Converter, value: Any, kind: Any) -> Any:
 
 
 def _union(converter: Converter, value: Any, kind: Any) -> Any:
-    """Structure a region, a number or its keys, strokes of the first frame or of several, or what may be null."""
+    """Convert a value of the JSON that may have several types. This is a hook of cattrs.
+
+    These are: a region of any kind; a number or its keys; strokes of one frame or of several; a value or null.
+    """
     first, *others = get_args(kind)
     if kind == records.AnyRegionRecord:
         word = value.get("kind", "line") if isinstance(value, dict) else "line"
@@ -154,6 +186,8 @@ def _union(converter: Converter, value: Any, kind: Any) -> Any:
 
 
 def _exactly(wanted: type, name: str) -> Callable[[Any, Any], Any]:
+    """Return a hook of cattrs that accepts values of exactly this type. `name` is the type's name in errors."""
+
     def structure(value: Any, _kind: Any) -> Any:
         if type(value) is not wanted:
             raise ValueError(f"{shown(value)} is not {name}")
@@ -163,6 +197,7 @@ def _exactly(wanted: type, name: str) -> Callable[[Any, Any], Any]:
 
 
 def _choice(value: Any, kind: Any) -> Any:
+    """Return a value of the JSON if its type allows it, else raise ValueError. This is a hook of cattrs."""
     allowed = get_args(kind)
     if not any(type(value) is type(option) and value == option for option in allowed):
         raise ValueError(f"{shown(value)} is none of {', '.join(map(str, allowed))}")
@@ -170,7 +205,10 @@ def _choice(value: Any, kind: Any) -> Any:
 
 
 def _items(converter: Converter, value: Any, kind: Any) -> list | tuple:
-    """Structure a list, or a tuple whose items have one type."""
+    """Convert a list of the JSON to a list, or to a tuple whose items have one type. This is a hook of cattrs.
+
+    Keys have to be in ascending order of their frames.
+    """
     inner = get_args(kind)
     if not isinstance(value, list):
         raise ValueError(f"{shown(value)} is not a list")
@@ -194,7 +232,7 @@ def _items(converter: Converter, value: Any, kind: Any) -> list | tuple:
 
 
 def _of_field(name: str, message: str) -> Exception:
-    """Return an error about a field of an object."""
+    """Return an error about a field of a JSON object, from which `_first_fault` makes the place."""
     from cattrs.errors import AttributeValidationNote, ClassValidationError
 
     error = ValueError(message)
@@ -203,6 +241,7 @@ def _of_field(name: str, message: str) -> Exception:
 
 
 def _dataclass(kind: Any, converter: Converter) -> Callable[[Any, Any], Any]:
+    """Return a hook of cattrs that converts JSON objects to a record, and refuses fields that it does not know."""
     from cattrs.gen import make_dict_structure_fn
 
     structure_fields = make_dict_structure_fn(kind, converter, _cattrs_forbid_extra_keys=True)
@@ -216,12 +255,13 @@ def _dataclass(kind: Any, converter: Converter) -> Callable[[Any, Any], Any]:
 
 
 def _made_of(*origins: Any) -> Callable[[Any], bool]:
+    """Return a function that tells whether a type is made with one of these, such as Literal or list."""
     return lambda kind: get_origin(kind) in origins
 
 
 @cache
 def _converter() -> Converter:
-    """Return the converter.
+    """Return the cattrs converter that makes records of a recipe's JSON.
 
     Raises:
         RecipeError: cattrs is missing. Blender brings it, but a Linux distribution's Blender may not. Effects render
@@ -247,7 +287,7 @@ def _converter() -> Converter:
 
 
 def _first_fault(error: Exception) -> str:
-    """Return the first fault as `place: what is wrong`."""
+    """Return the first fault in an exception of cattrs as a sentence, `place: what is wrong`."""
     import cattrs
     from cattrs.errors import ForbiddenExtraKeysError
 
@@ -265,7 +305,7 @@ def _first_fault(error: Exception) -> str:
 
 
 def shown(value: Any) -> str:
-    """Return a value as JSON, cut to 40 characters without formatting the rest."""
+    """Return a value as JSON for a message, cut to 40 characters."""
     text = ""
     for part in json.JSONEncoder(ensure_ascii=False).iterencode(value):
         text += part
@@ -275,20 +315,26 @@ def shown(value: Any) -> str:
 
 
 def cut(text: str) -> str:
+    """Return a text, cut to 40 characters with an ellipsis."""
     return text if len(text) <= 40 else text[:37] + "…"
 
 
 def plain(number: float) -> str:
+    """Return a number as text for a message, with at most ten digits of a float."""
     return shown(number) if isinstance(number, int) else f"{number:.10g}"
 
 
 def _require(condition: object, place: str, message: str) -> None:
+    """Raise RecipeError with the place and the message unless the condition holds."""
     if not condition:
         raise RecipeError(f"{place}: {message}")
 
 
 def check(recipe: Any) -> None:
-    """Check the record of a recipe.
+    """Check what the types of a recipe's record do not tell, such as names that refer to something.
+
+    Args:
+        recipe: A records.RecipeRecord.
 
     Raises:
         RecipeError: It does not describe a valid effect.
@@ -310,6 +356,13 @@ def check(recipe: Any) -> None:
 
 
 def _check_bars(shutter: Any, window: int, place: str) -> None:
+    """Check the bars of a shutter's record at each key.
+
+    Args:
+        shutter: The record.
+        window: The number of bars that the recipe has.
+        place: The shutter's place in the recipe, for messages.
+    """
     _require((shutter.bars is None) != (not shutter.keys), place, "either bars or keys, one of the two")
     said = {f"{place}.keys[{k}].bars": key.bars for k, key in enumerate(shutter.keys)}
     for where, bars in (said or {f"{place}.bars": shutter.bars}).items():
@@ -321,7 +374,7 @@ def _check_bars(shutter: Any, window: int, place: str) -> None:
 
 
 def _check_exposure(shutter: Any, place: str) -> None:
-    """Check settings of a shutter that depend on each other."""
+    """Check settings of a shutter's record that need or exclude each other."""
     if shutter.trail is not None:
         _require(shutter.follow, f"{place}.trail", "the shutter follows nothing that moves")
         _require(shutter.length == "bars", f"{place}.trail", "a shutter has one length")
@@ -334,7 +387,7 @@ def _check_exposure(shutter: Any, place: str) -> None:
 
 
 def _check_follow(follow: str | None, regions: list, place: str) -> None:
-    """Check that a shutter follows one region, or the camera."""
+    """Check that the name that a shutter follows is that of exactly one region, or of the camera."""
     if follow is None:
         return
     called = [f"regions[{i}]" for i, region in enumerate(regions) if region.name == follow]
@@ -347,7 +400,7 @@ def _check_follow(follow: str | None, regions: list, place: str) -> None:
 
 
 def _check_drawn(region: Any, place: str) -> int:
-    """Check a region's drawings, and return the points of the largest."""
+    """Check the drawings in a region's record, and return the number of points of the largest."""
     drawn = drawn_in(region)
     if not drawn:
         return 0

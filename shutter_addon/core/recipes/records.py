@@ -1,4 +1,4 @@
-"""Records of a recipe's JSON for cattrs, and their conversion to and from effects.
+"""The records (dataclasses) that cattrs makes of a recipe's JSON, and their conversion to and from effects.
 
 A record has the fields that the model declares, and special ones: bars, strokes and keys. Frames are timeline frames; 1
 is the strip's first. Points are fractions of the picture, y up.
@@ -25,7 +25,12 @@ VERSION = 2  # the newest that is read; in version 1, bars counted moments betwe
 
 
 class Within(NamedTuple):
-    """The range of a number, or of the length of a text or a list; `empty` says what an empty one lacks."""
+    """The range of a number, or of the length of a text or a list.
+
+    Attributes:
+        least, most: The ends of the range, which are inside it.
+        empty: What the error says of an empty text or list that may not be empty.
+    """
 
     least: float
     most: float
@@ -33,7 +38,7 @@ class Within(NamedTuple):
 
 
 def around(most: float) -> Within:
-    """Return the range −most to most."""
+    """Return the range from −most to most."""
     return Within(-most, most)
 
 
@@ -48,7 +53,13 @@ Stroke = Annotated[list[Point], Within(1, math.inf, "empty: a stroke has at leas
 
 @dataclass(frozen=True)
 class ValueKey:
-    """A key: a number at a frame, with its easing."""
+    """A key of a number, in a recipe.
+
+    Attributes:
+        frame: The frame.
+        value: The number.
+        ease: The ease until the next key.
+    """
 
     frame: Frame
     value: float
@@ -57,13 +68,20 @@ class ValueKey:
 
 @cache
 def _keys(least: float, most: float, fewest: int = 0) -> Any:
-    """Return the type of a list of keys whose values are in a range."""
+    """Return the type of a list of keys (ValueKey), for cattrs.
+
+    Args:
+        least, most: The range of the keys' values.
+        fewest: The least number of keys.
+    """
     value, count = ("value", Annotated[float, Within(least, most)]), Within(fewest, limits.MAX_KEYS, _NO_KEY)
     return Annotated[list[make_dataclass("ValueKey", [value], bases=(ValueKey,), frozen=True)], count]  # type: ignore[misc]
 
 
 @dataclass(frozen=True)
 class BarsKey:
+    """A key of a shutter's bars, in a recipe."""
+
     frame: Frame
     bars: list[float]
     ease: Ease = "linear"
@@ -71,7 +89,13 @@ class BarsKey:
 
 @dataclass(frozen=True)
 class MoveKey:
-    """A placement: location in fractions of the picture, rotation in degrees counter-clockwise."""
+    """A key of the placement of a region or the camera, in a recipe.
+
+    Attributes:
+        location: Fractions of the picture, y up.
+        rotation: Degrees counter-clockwise.
+        ease: The ease until the next key.
+    """
 
     frame: Frame
     location: Point = (0.0, 0.0)
@@ -82,7 +106,7 @@ class MoveKey:
 
 @dataclass(frozen=True)
 class StrokesKey:
-    """Strokes at a frame."""
+    """The strokes on a subject that are drawn at a frame, in a recipe."""
 
     frame: Frame
     strokes: list[Stroke]
@@ -94,13 +118,13 @@ Strokes = list[Stroke] | Annotated[list[StrokesKey], _KEYS]  # of frame 1, or of
 
 @dataclass(frozen=True)
 class RegionKey(MoveKey):
-    """A placement, and optionally new strokes."""
+    """A key of a region's placement, in a recipe, which can also have a new drawing of the region."""
 
     strokes: list[Stroke] | None = None
 
 
 def _type_of(each: Field) -> Any:
-    """Return the type of a field's value in a recipe."""
+    """Return the type that the value of a property has in a recipe, for cattrs."""
     if each.choices:
         return Literal[tuple(each.words.values())]
     if isinstance(each.default, tuple):
@@ -112,11 +136,12 @@ def _type_of(each: Field) -> Any:
 
 
 def _record(name: str, kinds: tuple[type, ...], **special: tuple[Any, Any]) -> type:
-    """Build a record class.
+    """Make the record class for a part of a recipe.
 
     Args:
-        kinds: Classes of the model whose fields the record has; the first becomes its `model`.
-        special: More fields, each with its type and default.
+        name: The class's name.
+        kinds: Classes of the model whose properties the record has; the first becomes its attribute `model`.
+        special: More fields: (type, default) by name. They replace properties of the same name.
     """
     said: dict[str, Any] = {name: special[name] for name in ("version", "kind") if name in special}
     said |= {each.recipe: (_type_of(each), each.absent) for each in fields_of(*kinds).values() if each.recipe} | special
@@ -181,7 +206,10 @@ RecipeRecord: Any = _record(
 
 
 def effect_of(recipe: Any) -> model.Effect:
-    """Return the effect of a checked recipe. `Effect.for_picture` gives it the aspect of pictures."""
+    """Return the effect of a recipe's record, which has been checked. It needs the aspect of pictures, too.
+
+    Effect.for_picture adds that.
+    """
     options = Options(**_values(Options, recipe))
     order = {shutter.name: index for index, shutter in enumerate(recipe.shutters)}
     regions = tuple(_region(region, order[region.shutter]) for region in recipe.regions)
@@ -203,7 +231,10 @@ def effect_of(recipe: Any) -> model.Effect:
 
 
 def _filmed(effect: model.Effect, options: Options) -> model.Effect:
-    """Convert an effect of version 1, whose bars counted moments between filmed frames."""
+    """Convert an effect from a recipe of version 1, whose bars count moments, to one whose bars count filmed frames.
+
+    Moments are filmed frames, and those made between them.
+    """
     steps, position, lost = int(options.step), options.position, []
     shutters = []
     for shutter in effect.shutters:
@@ -218,21 +249,23 @@ def _filmed(effect: model.Effect, options: Options) -> model.Effect:
 
 
 def _values(kind: type, record: Any) -> dict[str, Any]:
-    """Return a record's values for the fields of a class, by the model's names."""
+    """Return a record's values for the properties of a class, by the names of the model."""
     said = {name: (each, getattr(record, each.recipe)) for name, each in fields_of(kind).items() if each.recipe}
     return {name: _channel(value) if each.is_channel else value for name, (each, value) in said.items()}
 
 
 def _channel(value: float | list[ValueKey]) -> Channel:
+    """Return the channel of a number or of its keys in a record."""
     return Keys(*_columns(value, "frame", "value", "ease")) if isinstance(value, list) else Constant(value)
 
 
 def _columns(keys: list, *names: str) -> list[tuple]:
-    """Return the named fields of keys, each as a tuple."""
+    """Return for each of the names a tuple with that field of all keys."""
     return [tuple(getattr(key, name) for key in keys) for name in names]
 
 
 def _shutter(record: Any, follow: model.Subject | None) -> model.Shutter:
+    """Return the shutter of a record, which follows the region or camera `follow`."""
     values = _values(model.Shutter, record) | {"length": "frames" if record.length == "bars" else record.length}
     if record.trail is not None:
         values |= {"length": "motion", "trail": _channel(record.trail)}
@@ -250,7 +283,12 @@ def _shutter(record: Any, follow: model.Subject | None) -> model.Shutter:
 
 
 def _moves(keys: list, *, drawn: bool = False) -> model.Moves:
-    """Return the moves of keys. If `drawn`, keys that only hold drawings are not motion."""
+    """Return the placement over time for keys of a record.
+
+    Args:
+        keys: MoveKeys.
+        drawn: The keys are there for their drawings. If none of them moves anything, there is no motion.
+    """
     placed = [(key.frame, Placement(key.location, key.rotation, key.scale), key.ease) for key in keys]
     if drawn and all(placement == Placement() for _frame, placement, _ease in placed):
         return model.Moves()
@@ -258,6 +296,7 @@ def _moves(keys: list, *, drawn: bool = False) -> model.Moves:
 
 
 def _region(record: Any, shutter: int) -> model.Region | model.MatteRegion:
+    """Return the region of a record, with the index of its shutter."""
     values: dict[str, Any] = _values(record.model, record) | {"shutter": shutter}
     values["moves"] = _moves(record.keys, drawn=isinstance(record, SubjectRecord))
     values |= {name: _drawings(record.name, drawn) for name, drawn in drawn_in(record).items()}
@@ -274,9 +313,9 @@ def _region(record: Any, shutter: int) -> model.Region | model.MatteRegion:
 
 
 def drawn_in(record: Any) -> dict[str, list[Drawing]]:
-    """Return what is drawn in a region's record, by the model's names.
+    """Return the drawings in a region's record, by the names of the model; none for mattes and ramps.
 
-    The own strokes of a scribble or an outline are the first drawing, unless its first key has strokes.
+    The field `strokes` of a scribble or an outline is its first drawing, unless its first key has strokes.
     """
     drawn = [(key.frame, key.strokes, key.ease) for key in record.keys if getattr(key, "strokes", None) is not None]
     if isinstance(record, SubjectRecord):
@@ -290,20 +329,25 @@ def drawn_in(record: Any) -> dict[str, list[Drawing]]:
 
 
 def _marks(strokes: Any) -> list[Drawing]:
-    """Return the drawings of a subject's strokes."""
+    """Return the drawings of the strokes on a subject, which a recipe gives as strokes of frame 1 or as StrokesKeys."""
     is_keyed = strokes and isinstance(strokes[0], StrokesKey)
     keys = strokes if is_keyed else [StrokesKey(1.0, strokes)] if strokes else []
     return [(key.frame, key.strokes, "linear") for key in keys]
 
 
 def _drawings(name: str, drawn: list[Drawing]) -> model.Drawings:
+    """Return the drawings of a record as those of the model. `name` is the region's."""
     strokes = tuple([np.asarray(stroke, float) for stroke in strokes] for _frame, strokes, _ease in drawn)
     frames, eases = tuple(frame for frame, *_ in drawn), tuple(ease for *_, ease in drawn)
     return model.Drawings(name=name, frames=frames, strokes=strokes, eases=eases, aspect=1.0)
 
 
 def recipe_of(effect: model.Effect) -> dict[str, Any]:
-    """Return the JSON of an effect with constant or keyed channels and unique names of shutters."""
+    """Return an effect as the JSON object of a recipe; the inverse of `effect_of`.
+
+    Args:
+        effect: With keyed or constant channels, and shutters whose names are unique.
+    """
     options, names = effect.options.at(1), [shutter.name for shutter in effect.shutters]
     said = {"version": VERSION} | _words(Options, options) | _words(model.Effect, effect)
     said |= _words(model.Camera, effect.camera)
@@ -317,7 +361,12 @@ def recipe_of(effect: model.Effect) -> dict[str, Any]:
 
 
 def _words(kind: type, part: Any) -> dict[str, Any]:
-    """Return the recipe's fields for an object of a class; the inverse of `_values`."""
+    """Return a recipe's fields for the properties of a class; the inverse of `_values`.
+
+    Args:
+        kind: The class of the model.
+        part: An object with these properties.
+    """
     said = {}
     for name, each in fields_of(kind).items():
         if each.recipe:
@@ -328,17 +377,23 @@ def _words(kind: type, part: Any) -> dict[str, Any]:
 
 
 def _keyable(channel: Channel) -> Any:
-    """Return a number, or its keys."""
+    """Return a channel's number, or its keys, as a recipe has them."""
     return _keys_of(channel, value=channel.values) if isinstance(channel, Keys) else float(channel.at(1))
 
 
 def _keys_of(channel: Keys, **columns: Iterable) -> list[dict[str, Any]]:
-    """Return the keys of a channel, with these fields beside frame and ease."""
+    """Return the keys of a channel as JSON objects.
+
+    Args:
+        channel: The channel.
+        columns: The values of all keys, for each field besides frame and ease.
+    """
     rows = zip(channel.frames, channel.eases, *columns.values(), strict=True)
     return [dict(zip(("frame", "ease", *columns), row, strict=True)) for row in rows]
 
 
 def _shutter_words(shutter: model.Shutter) -> dict[str, Any]:
+    """Return a shutter as a JSON object."""
     said, chooses = _words(model.Shutter, shutter), shutter.combine in EXTREMES
     unused = set() if shutter.follow else {"follow_motion", "follow_smooth"}
     if shutter.follow:
@@ -360,6 +415,7 @@ def _shutter_words(shutter: model.Shutter) -> dict[str, Any]:
 
 
 def _move_keys(moves: model.Moves) -> list[dict[str, Any]]:
+    """Return the keys of a placement over time as JSON objects; none if it has no keys."""
     numbers = {"location": moves.location, "rotation": moves.rotation, "scale": moves.scale}
     if not isinstance(moves.location, Keys):
         return []
@@ -367,12 +423,13 @@ def _move_keys(moves: model.Moves) -> list[dict[str, Any]]:
 
 
 def _strokes_of(drawings: model.Drawings) -> dict[float, list[Stroke]]:
-    """Return strokes by the frames of their drawings."""
+    """Return drawings as lists of strokes, by frame."""
     drawn = ([[(x, y) for x, y in stroke.tolist()] for stroke in strokes] for strokes in drawings.strokes)
     return dict(zip(drawings.frames, drawn, strict=True))
 
 
 def _region_words(region: Any, shutter: str) -> dict[str, Any]:
+    """Return a region as a JSON object. `shutter` is the name of its shutter."""
     said = _words(type(region), region) | {"shutter": shutter}
     keys, drawn = {key["frame"]: key for key in _move_keys(region.moves)}, {}
     if isinstance(region, model.SubjectRegion):
@@ -400,6 +457,6 @@ def _region_words(region: Any, shutter: str) -> dict[str, Any]:
 
 
 def _keyed(drawings: model.Drawings) -> list:
-    """Return a subject's strokes, without keys if they are of frame 1."""
+    """Return the strokes on a subject as a recipe has them: with frames, unless they are those of frame 1 only."""
     drawn = _strokes_of(drawings)
     return drawn[1] if list(drawn) == [1] else [{"frame": f, "strokes": strokes} for f, strokes in drawn.items()]
