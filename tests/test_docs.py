@@ -17,7 +17,7 @@ GERMAN = runpy.run_path(ROOT / "shutter_addon" / "blender" / "interface" / "tran
 # What the pages for editors name of Blender and other programs, in italics as our own labels.
 BLENDERS = {
     *("2D Stabilization", "Alpha Over", "Annotate Polygon", "Cryptomatte", "File Output", "Frame Dropping"),
-    *("Generated", "Keyframe Type", "Line Width", "Pass Index", "Rendered", "Replace", "Resolution Scale"),
+    *("Generated", "Keyframe Type", "Pass Index", "Rendered", "Replace"),
     *("Single Image", "Standard", "Sync", "ACES", "ADX", "AgX", "Khronos PBR Neutral", "Big Buck Bunny"),
 }
 

@@ -15,7 +15,7 @@ POSITIONS = (
 
 
 INTERPOLATIONS = (
-    ("DISPLACEMENT", "Displacement", "Move times between shutters and between keyframes"),
+    ("DISPLACEMENT", "Displacement", "Move the exposure in time from one shutter or keyframe to the next"),
     ("VALUE", "Value", "Cross-fade pictures between shutters, and fade every bar by itself between keyframes"),
 )
 
@@ -36,7 +36,7 @@ EDGES = (
     ("HOLD", "Hold", "Repeat the first or last frame beyond the clip's ends"),
     ("MIRROR", "Mirror", "Play the clip backward beyond its ends"),
     ("SHORTEN", "Shorten", "Leave out what lies beyond the clip's ends"),
-    ("SLIDE", "Slide", "Move exposures into the clip, by the number of frames that they reach beyond its ends"),
+    ("SLIDE", "Slide", "Move an exposure that reaches beyond the clip's ends back into the clip"),
 )
 
 
@@ -67,7 +67,7 @@ STROKES = (
 DRAWN = (
     *STROKES,
     ("OUTLINE", "Outline", "A drawn matte: everything inside closed curves, exact to the pixel"),
-    ("SUBJECT", "Subject", "What a model finds under strokes, and follows: outlines that are drawn overrule it"),
+    ("SUBJECT", "Subject", "What a model finds under strokes and follows; drawn outlines overrule the model"),
 )
 
 
@@ -105,12 +105,12 @@ CHANNELS = (
 
 TIMINGS = (
     ("SOURCE", "Footage", "The matte follows the frames of the footage, even if that is trimmed or retimed"),
-    ("TIMELINE", "Timeline", "The matte plays along the timeline, from where the Shutter strip starts untrimmed"),
+    ("TIMELINE", "Timeline", "The matte plays along the timeline, from where the untrimmed Shutter strip would start"),
 )
 
 
 BLENDS = (
-    ("OVER", "Over", "Regions below share what the matte leaves"),
+    ("OVER", "Over", "The matte covers the regions below"),
     ("ADD", "Add", "The matte replaces only the default shutter, so that mattes can be side by side"),
 )
 
@@ -154,7 +154,7 @@ COMBINES = (
 LENGTHS = (
     ("FRAMES", "Frames", "The bars set for how many frames the shutter is open"),
     ("TIMELINE", "Timeline", "The bars are the exposure during one timeline frame, at any speed of the footage"),
-    ("MOTION", "Distance", "The shutter is open while what it follows moves by a distance; bars only set the shape"),
+    ("MOTION", "Distance", "Open until the followed region or camera has moved by a distance; bars only set the shape"),
 )
 
 SIDES = (

@@ -78,7 +78,7 @@ class Options:
         AGGREGATES, default=1, keyed=True
     )
     border: bool = Labelled(
-        "Keep Edges Default", "Give the picture's edge to the default shutter, so that a single stroke acts locally"
+        "Keep Edges Default", "Give the picture's edge to the default shutter, so that strokes act only nearby"
     ).switch(keyed=True)
     stop_at_cuts: bool = Labelled(
         "Stop at Cuts", "End exposures at cuts of the source, like at the clip's ends"
@@ -92,7 +92,7 @@ class Options:
         "Clean Edges", "Separate the colors of layers and their background in the mixed pixels at edges"
     ).switch(default=True, keyed=True)
     step: int = Labelled(
-        "Smooth", "Also expose moments between filmed frames, found by optical flow, where both bars are open"
+        "Smooth", "Also expose pictures between two frames whose bars are open, which optical flow makes"
     ).choice(SMOOTH, default=1, blender="inbetween", recipe="inbetween")
     skip_repeats: bool = Labelled(
         "Skip Repeated Frames",

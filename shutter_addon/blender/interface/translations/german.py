@@ -434,7 +434,7 @@ MESSAGES = {
     ("Virtual Shutter", "Subject"): "Motiv",
     (
         "*",
-        "What a model finds under strokes, and follows: outlines that are drawn overrule it",
+        "What a model finds under strokes and follows; drawn outlines overrule the model",
     ): "Was ein Modell unter Strichen findet und verfolgt; gezeichnete Umrisse gehen ihm vor",
     ("*", "Not This"): "Das nicht",
     ("Operator", "Not This"): "Das nicht",
@@ -690,14 +690,14 @@ MESSAGES = {
     ("*", "Timeline"): "Zeitleiste",
     (
         "*",
-        "The matte plays along the timeline, from where the Shutter strip starts untrimmed",
+        "The matte plays along the timeline, from where the untrimmed Shutter strip would start",
     ): "Die Matte läuft mit der Zeitleiste, vom ungetrimmten Anfang des Verschlussstreifens an",
     ("*", "Offset"): "Versatz",
     ("*", "Number of frames by which the matte plays ahead"): "Bilder, um die die Matte voraus ist",
     ("Virtual Shutter", "Blend"): "Mischmodus",
     ("*", "How the matte combines with other regions"): "Wie die Matte über anderen Regionen liegt",
     ("Virtual Shutter", "Over"): "Über",
-    ("*", "Regions below share what the matte leaves"): "Was darunter liegt, teilt sich, was die Matte übrig lässt",
+    ("*", "The matte covers the regions below"): "Die Matte verdeckt die Regionen darunter",
     ("Virtual Shutter", "Add"): "Addieren",
     (
         "*",
@@ -762,8 +762,8 @@ MESSAGES = {
     ("*", "Displacement"): "Verschiebung",
     (
         "*",
-        "Move times between shutters and between keyframes",
-    ): "Zeiten zwischen Verschlüssen und zwischen Schlüsselbildern verschieben",
+        "Move the exposure in time from one shutter or keyframe to the next",
+    ): "Die Belichtung von einem Verschluss oder Schlüsselbild zum nächsten in der Zeit verschieben",
     ("*", "Value"): "Wert",
     (
         "*",
@@ -810,8 +810,8 @@ MESSAGES = {
     ("Virtual Shutter", "Slide"): "Verschieben",
     (
         "*",
-        "Move exposures into the clip, by the number of frames that they reach beyond its ends",
-    ): "Eine Belichtung in den Clip schieben, um so viele Bilder, wie sie über seine Enden hinausreicht",
+        "Move an exposure that reaches beyond the clip's ends back into the clip",
+    ): "Eine Belichtung, die über die Enden des Clips hinausreicht, in den Clip zurückschieben",
     ("*", "Matte Resolution"): "Mattenauflösung",
     (
         "*",
@@ -845,8 +845,8 @@ MESSAGES = {
     ("*", "Keep Edges Default"): "Rand bleibt Standard",
     (
         "*",
-        "Give the picture's edge to the default shutter, so that a single stroke acts locally",
-    ): "Den Bildrand zu einer Markierung des Standardverschlusses machen, so dass ein einzelner Strich örtlich wirkt",
+        "Give the picture's edge to the default shutter, so that strokes act only nearby",
+    ): "Den Bildrand zu einer Markierung des Standardverschlusses machen, so dass Striche nur in ihrer Nähe wirken",
     ("*", "Follow Edges"): "Kanten folgen",
     (
         "*",
@@ -856,9 +856,8 @@ MESSAGES = {
     ("*", "Smooth"): "Glätten",
     (
         "*",
-        "Also expose moments between filmed frames, found by optical flow, where both bars are open",
-    ): "Auch Zeitpunkte zwischen gefilmten Bildern belichten, die optischer Fluss findet: Licht zählt zwischen zwei "
-    "Bildern, deren Balken beide offen sind",
+        "Also expose pictures between two frames whose bars are open, which optical flow makes",
+    ): "Auch Bilder zwischen zwei Bildern belichten, deren Balken offen sind; der optische Fluss macht sie",
     ("*", "Expose only filmed frames"): "Nur gefilmte Bilder belichten",
     ("*", "2 moments per filmed frame"): "2 Zeitpunkte von einem gefilmten Bild zum nächsten",
     ("*", "4 moments per filmed frame"): "4 Zeitpunkte von einem gefilmten Bild zum nächsten",
@@ -1135,9 +1134,8 @@ MESSAGES = {
     ): "Die Balken sagen, wie viele Bilder lang der Verschluss offen ist",
     (
         "*",
-        "The shutter is open while what it follows moves by a distance; bars only set the shape",
-    ): "Der Verschluss ist offen, während sich das, womit er sich mitbewegt, um eine gegebene Strecke bewegt; "
-    "die Balken sind die Form",
+        "Open until the followed region or camera has moved by a distance; bars only set the shape",
+    ): "Offen, bis sich die verfolgte Region oder Kamera um eine Strecke bewegt hat; die Balken sind nur die Form",
     ("*", "Distance"): "Strecke",
     (
         "*",
