@@ -107,7 +107,7 @@ def size_of(path: Path) -> int | None:
 
 
 def opened(path: Path, spec: ImageSpec) -> ImageInput | None:
-    """Open a picture file that the extension has written, but only if it is exactly as expected.
+    """Open a picture file that the extension has written, but only if its header is as expected.
 
     Args:
         path: The file.
@@ -115,7 +115,8 @@ def opened(path: Path, spec: ImageSpec) -> ImageInput | None:
             pixels.
 
     Returns:
-        None if it is missing, damaged or otherwise.
+        The file, which the caller closes; its samples may still be damaged. None: it is missing, a link, far too
+        large or cannot be read, or its size or samples differ from `spec`.
     """
     size = size_of(path)
     if size is None or size > 2 * spec.image_bytes() + _LARGER:

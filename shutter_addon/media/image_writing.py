@@ -31,7 +31,7 @@ def write_exr(path: Path, values: np.ndarray, names: Sequence[str], note: str = 
 
 
 def write_grey(path: Path, values: np.ndarray) -> None:
-    """Write values (height, width) float32, 0 … 1, as a 16-bit PNG.
+    """Write values (height, width) float32, top row first, as a 16-bit grey PNG. They must be 0 … 1.
 
     Raises:
         MediaError: It cannot be written.

@@ -129,7 +129,7 @@ class TrackStop(PropertyGroup):
 
 
 class DrawnPlace(PropertyGroup):
-    """Where a region was when it was drawn at a frame, so that moving the region later does not move that drawing.
+    """Where a region was when its drawing at a frame was made: its strokes move along with the region from there.
 
     Attributes:
         frame: Counts from the effect's start, so that it moves with the effect's strips.
@@ -268,10 +268,13 @@ class ShutterEffect(_Settings, PropertyGroup):
 
 
 class ShutterScene(PropertyGroup):
-    """A scene's effects, and the version and data format that saved them (data_format).
+    """What the extension stores on a scene.
+
+    On a scene with a sequencer: its effects, and the version and data format that saved them (data_format).
 
     Attributes:
-        identity: On an effect scene, tells it from copies of it.
+        identity: Of an effect scene; "": it is none. The effect, its strip and its annotation store it, too, so that
+            the scene is found again. A copied scene gets another one (editing/reconcile.py).
     """
 
     effects: CollectionProperty(type=ShutterEffect)

@@ -155,7 +155,9 @@ def assign_region(effect: PropertyGroup, index: int, shutter: PropertyGroup) -> 
 
 
 def hold_drawings(effect: PropertyGroup, index: int) -> None:
-    """Note where a region is at each of its drawings, before the region is moved. Its strokes then move along with it.
+    """Note for each drawing of a region where the region was when it was drawn, unless that is noted already.
+
+    Call it before the region is moved: the strokes then move along. It does nothing for mattes (strips.LAID).
 
     Args:
         index: Of the region.

@@ -80,7 +80,10 @@ class ShutterPreview(PropertyGroup):
 
 
 def _draw() -> None:
-    """Draw everything over a preview. This is the draw handler, which Blender calls whenever it has drawn one."""
+    """Draw the picture, strokes and notes over a preview. Blender calls this draw handler whenever it has drawn one.
+
+    Changed strokes are noticed here, too, as Blender does not report them. Gizmos draw themselves.
+    """
     context = bpy.context
     blender_gpu.free_unused()
     decision = previews.take_decision()

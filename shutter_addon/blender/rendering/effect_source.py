@@ -123,13 +123,15 @@ class SourceKey:
 
 
 def known_steps(snapshot: Snapshot) -> int | None:
-    """Return an effect's steps from a frame of the footage to the next; None: find_steps has not found them yet."""
+    """Return what find_steps returns, without any work; None: it was not found yet."""
     key = steps_key(snapshot)
     return 1 if key[1] == 1 else _steps.get(key)
 
 
 def find_steps(snapshot: Snapshot) -> int:
-    """Return an effect's steps from a frame of the footage to the next. It may take long, to compare frames.
+    """Return how many steps lead from a frame of the footage to the next: 1, or n with n − 1 moments in between.
+
+    With *Smooth* on Automatic, the first call compares frames, which takes long.
 
     Raises:
         EffectError, MediaError: The footage cannot be read.

@@ -41,7 +41,7 @@ def _ask_window() -> None:
 
 
 def _ask_offscreen() -> None:
-    """Free the GPU memory that renders keep for the next one, unless one is running."""
+    """Free GPU memory for previews: what finished renders keep for the next render, unless one is running."""
     if not render_job.runs():
         SESSIONS.offscreen.free()
 

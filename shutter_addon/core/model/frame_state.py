@@ -30,8 +30,8 @@ class Combine:
     Attributes:
         mode: The average, lightest, darkest or median of the frames.
         by_luminance: For lightest and darkest: choose a pixel's frame by luminance, not for each color channel.
-        threshold: For lightest and darkest: the luminance of linear light above which a frame leaves a trail (below
-            which, for darkest); white is 1. None: every frame does.
+        threshold: A pixel of a frame leaves a trail only if its luminance in linear light is above this for lightest,
+            or below this for darkest; white is 1. The shown frame always counts. None: every frame does.
         softness: The range of luminance around the threshold in which trails fade in.
     """
 

@@ -116,7 +116,7 @@ def knots(shutters: ArrayLike) -> Quantile:
 
 
 def _on_levels(part: Quantile, levels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the times of a quantile at other bounds z: at the start and at the end of each piece.
+    """Split the pieces of a quantile at more bounds z. Return the times at which each new piece starts and ends.
 
     Args:
         part: The quantile.

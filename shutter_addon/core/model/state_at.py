@@ -463,7 +463,10 @@ def on_timeline(bars: np.ndarray, options: Options, positions: np.ndarray) -> np
 
 
 def _spread(start: float, end: float, window: int) -> np.ndarray:
-    """Return the shares (L,) of the time from `start` to `end` that fall on each frame of a window."""
+    """Return which share (L,) of the time from `start` to `end` falls on each frame of a window.
+
+    Times count frames from the window's first. A time span without length falls on one frame.
+    """
     if end - start < _INSTANT:
         return (np.arange(window) == np.floor(start + _INSTANT)).astype(float)
     boundaries = np.clip(np.arange(window + 1), start, end)

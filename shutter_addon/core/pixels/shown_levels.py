@@ -35,9 +35,10 @@ class Display:
 
 @lru_cache(2)
 def _noise(width: int, height: int, dither: float) -> np.ndarray:
-    """Return the noise of dither for each pixel: triangularly distributed, scaled to code values, bottom row first.
+    """Return the noise of dither (height, width) to add to code values, of which white is 1; bottom row first.
 
-    It is the hash iqint3 of the pixel's place (Jarzynski and Olano, Hash Functions for GPU Rendering, 2020).
+    It is triangularly distributed within ±0.0033 · dither, like Blender's. Do not modify it: it is cached. It is made
+    by the hash iqint3 of the pixel's place (Jarzynski and Olano, Hash Functions for GPU Rendering, 2020).
     """
     if not dither:
         return np.zeros((height, width), np.float32)

@@ -92,7 +92,7 @@ class MoveKey:
     """A key of the placement of a region or the camera, in a recipe.
 
     Attributes:
-        location: Fractions of the picture, y up.
+        location: How far it is moved, in fractions of the picture, y up.
         rotation: Degrees counter-clockwise.
         ease: The ease until the next key.
     """

@@ -214,11 +214,11 @@ def _fastest(source: FrameSource, skip_repeats: bool) -> float:
 
 
 class Moved(NamedTuple):
-    """Points of a frame and the same points in a later one, (n,) complex: x + iy in heights of the picture, y down.
+    """How a picture moves between two frames: the points whose motion optical flow is sure of. `step` measures it.
 
     Attributes:
-        before: The points in the first frame.
-        after: The points in the other frame.
+        before: The points in the first frame, (n,) complex: x + iy in heights of the picture, y down.
+        after: The same points in the second frame.
     """
 
     before: np.ndarray

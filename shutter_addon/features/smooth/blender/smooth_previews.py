@@ -36,7 +36,7 @@ class _Coming:
         is_asked: Whether it was asked for since advance_smooth was last called.
         is_seen: Whether the plain picture was drawn.
         is_over: Whether nothing is left to do.
-        is_alone: Whether the device has no room for both pictures.
+        is_alone: Whether the device has no room for both pictures, so that only this one is shown.
         made: Key of the composed request; None: not composed.
         fault: Why there is no picture; None: no error.
         slices: Slices of time in which it is composed.
