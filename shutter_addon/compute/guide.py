@@ -55,7 +55,7 @@ def cell_of(short: int) -> int:
 
 
 class Guides:
-    """Makes the guides of a source's frames. Each frame is read and reduced once while it is kept."""
+    """Makes the guides of a source's frames. Each is read and reduced once, until `keep` drops it."""
 
     def __init__(self, source: FrameSource) -> None:
         self._source = source

@@ -40,7 +40,7 @@ def open_compositor(device: str = "gpu") -> Compositor:
         device: "gpu" (OpenGL 4.3) or "cpu" (NumPy).
 
     Raises:
-        NoDeviceError: There is no OpenGL 4.3.
+        NoDeviceError: There is no OpenGL 4.3, or no moderngl.
     """
     return CPUCompositor() if device == "cpu" else GPUCompositor(open_gl())
 

@@ -27,8 +27,8 @@ class MatteValues:
         Args:
             width, height: Of the pictures.
             step: Source frames for each filmed one (Options.step).
-            late: Called with the file and the frame of each matte of an outline that is not tracked to this frame yet.
-                The straight outline is used instead. None: such a matte is tracked now, which takes time.
+            late: Called with the file and the frame of each matte that is not tracked to this frame yet. What is
+                drawn, joined straight, is used instead. None: such a matte is tracked now, which takes time.
         """
         self._size, self._step, self._late = (width, height), step, late
         self._sources: dict[SourceFile, FrameSource] = {}

@@ -47,7 +47,7 @@ def run(arguments: Namespace) -> None:
 
 
 def _render_edit(arguments: Namespace) -> None:
-    """Render the saved edit that the arguments name, unchanged, to frames or a movie."""
+    """Render the saved edit that the arguments name, unchanged, to pictures."""
     for name in ("recipe", "weights", "save"):
         if getattr(arguments, name) is not None:
             why = "is for a source and a recipe; a saved edit is rendered as it is"

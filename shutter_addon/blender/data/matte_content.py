@@ -219,7 +219,7 @@ def parts_for(region: PropertyGroup, effect_strip: Strip) -> list:
 
 
 def part_at(parts: list, frame: float) -> Strip:
-    """Return the strip that lies at a timeline frame, the first of several; if there is none, the nearest."""
+    """Return the strip that lies at a timeline frame, the first listed of several; if there is none, the nearest."""
     return min(parts, key=lambda part: max(part.left_handle - frame, frame - part.right_handle + 1, 0))
 
 

@@ -15,7 +15,7 @@ def left_out(scene: Scene) -> list[tuple[range, str]]:
     """Return where the sequencer would silently leave an effect out of the picture.
 
     Returns:
-        For each such strip, the timeline frames at which it is shown, and the reason as a sentence for the user.
+        For each effect strip left out, the timeline frames where it lies unmuted, and why, as a sentence for the user.
     """
     reasons = ((shown_frames(scene, strip), why) for strip in own_strips(scene) if (why := _why(strip)) is not None)
     return [(frames, why) for frames, why in reasons if frames]

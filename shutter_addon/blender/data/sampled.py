@@ -63,7 +63,7 @@ def placement_now(moving: PropertyGroup) -> Placement:
 
 @dataclass(frozen=True)
 class Sampling:
-    """Reads an effect's properties as channels: constants, or values at some timeline frames where they have F-curves.
+    """Reads an effect's properties as channels: constants or, with F-curves, their values at some timeline frames.
 
     Attributes:
         curves: The F-curves of the scene that has the effect.

@@ -196,7 +196,8 @@ def _adopt(scenes: list[Scene]) -> None:
 def _place(strip: Strip) -> tuple[bool, int, int]:
     """Return a sort key for effect strips that show the same effect. The first in this order keeps the effect.
 
-    It is the strip whose content begins where the effect's does, else the first on the timeline. The others get copies.
+    The first is the strip whose content begins where the effect's does, else the first on the timeline. The others get
+    copies.
     """
     effect = strips.effect_of(strip.id_data, strip.scene)
     return effect is None or strips.origin(strip) != effect.start, strip.left_handle, strip.channel

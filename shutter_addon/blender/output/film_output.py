@@ -258,14 +258,14 @@ def render_made_edit(scene: Scene, output: Path) -> None:
 
 
 def render_frames(scene: Scene, output: Path, moved: Callable[[], None], move: Move = Path.replace) -> None:
-    """Render the frames of an edit to a movie, or to pictures in a folder that exists, by the edit's settings.
+    """Render an edit's frames to a movie, or to pictures of FORMATS in a folder that exists, by its settings.
 
-    Blender writes into a folder beside the output, from which finished files are moved.
+    Blender writes into a part folder beside the files, from which finished ones are moved.
 
     Args:
         output: The movie or the folder.
-        moved: Called after each frame. It may raise to end the render.
-        move: Called with a finished picture and its final path, to move it. It may raise to end the render.
+        moved: Called after each frame. UserError or OSError end the render.
+        move: Called with a finished picture and its final path, to move it. It may raise the same.
 
     Raises:
         OutputError, InterruptedRenderError: As in `render_made_edit`.

@@ -87,7 +87,7 @@ class Claims:
         return look is not None and now - self._seen[path][1] > self._patience
 
     def _touch(self) -> None:
-        """Touch all claims of this process every few seconds, until it ends. It runs on a thread of its own."""
+        """Touch the claims held here every few seconds, until the `with` block ends. It runs on a thread of its own."""
         while not self._ended.wait(self._beat):
             with self._lock:
                 held = list(self._held.items())

@@ -94,7 +94,7 @@ def keys(
 
 
 def gaps(seen: Collection[int], stops: Iterable[Stop], beside: int = 0) -> list[Gap]:
-    """Return the gaps of a track, ascending; those that touch become one. Arguments as for `keys`."""
+    """Return the gaps of a track at its stops, ascending; those that touch become one. Arguments as for `keys`."""
     merged: list[Gap] = []
     for each in sorted(_gap(seen, stop) for stop in stops):
         gap = each._replace(first=each.first - beside, last=each.last + beside)

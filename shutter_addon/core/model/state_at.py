@@ -463,9 +463,9 @@ def on_timeline(bars: np.ndarray, options: Options, positions: np.ndarray) -> np
 
 
 def _spread(start: float, end: float, window: int) -> np.ndarray:
-    """Return which share (L,) of the time from `start` to `end` falls on each frame of a window.
+    """Return which share (L,) of the time from `start` to `end` falls on each of a window's L frames.
 
-    Times count frames from the window's first. A time span without length falls on one frame.
+    Times count from its first frame. What lies outside is lost. A time without length falls on one frame.
     """
     if end - start < _INSTANT:
         return (np.arange(window) == np.floor(start + _INSTANT)).astype(float)

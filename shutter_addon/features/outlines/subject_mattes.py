@@ -354,7 +354,7 @@ class MarkedSubject:
     """The user's strokes that say what a subject is.
 
     Attributes:
-        strokes: On the subject, by frame of the footage: arrays of points (n, 2) in fractions of the picture, y up.
+        strokes: On the subject, by frame of the footage. Sequences of arrays (n, 2) become outlines.Curves.
         nots: On what it is not, likewise.
     """
 
