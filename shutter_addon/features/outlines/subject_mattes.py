@@ -467,8 +467,7 @@ class SubjectMattes(CarriedMattes):
         """Return a frame's picture, and a smaller one. That of the frame before is remembered."""
         if self._before is None or self._before[0] != frame:
             picture = self._picture(frame)
-            small = flow.resized(picture, carrying.working_size(self.width, self.height))
-            self._before = frame, picture, small
+            self._before = frame, picture, flow.resized(picture, carrying.working_size(self.width, self.height))
         return self._before[1:]
 
     def _carried_to(self, frame: int) -> Found:
