@@ -127,28 +127,28 @@ def test_it_fades_where_nothing_like_it_is_seen(tmp_path):
     assert gone < 0.1 * seen
 
 
-def around_the_edge(alpha):
-    inside, disc = (alpha > 0.5).astype(np.uint8), cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (9, 9))
-    return cv2.dilate(inside, disc) > cv2.erode(inside, disc)
-
-
-@pytest.mark.parametrize(("soft", "most"), [(0, 8), (1.2, 10)])
-def test_edges_are_as_soft_as_the_pictures(soft, most):
+@pytest.mark.parametrize(("soft", "scale", "most"), [(0, 1, 8), (1.2, 1, 10), (0, 3, 7.5)])
+def test_edges_are_as_soft_as_the_pictures(soft, scale, most):
     """Of a subject that is mixed with what lies behind it in linear light, as by a lens, mean levels beside its true
     alpha. Its outlines are hard."""
 
     def alpha(frame):
-        return cv2.GaussianBlur(truth(frame), (0, 0), soft) if soft else truth(frame)
+        cover = outlines.coverage(strokes(frame), scale * WIDTH, scale * HEIGHT)
+        return cv2.GaussianBlur(cover, (0, 0), soft) if soft else cover
 
     def mixed(frame):
         share = alpha(frame)[..., None]
-        light = share * to_linear(skin(frame) / 510 + 0.5) + (1 - share) * to_linear(ground(frame) / 510)
+        near, far = (cv2.resize(each(frame) / 510, share.shape[1::-1]) for each in (skin, ground))
+        light = share * to_linear(near + 0.5) + (1 - share) * to_linear(far)
         return np.rint(255 * to_encoded(light)).astype(np.uint8)
 
     drawn = [carrying.Drawing(frame, truth(frame)) for frame in (0, 8)]
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (8 * scale + 1,) * 2)
     for each in carrying.carried(mixed, *drawn, range(1, 8, 3)):
-        apart = np.abs(each.matte - 255 * alpha(each.frame))
-        assert apart[around_the_edge(alpha(each.frame))].mean() <= most, each.frame
+        wanted = alpha(each.frame)
+        inside = (wanted > 0.5).astype(np.uint8)
+        around = cv2.dilate(inside, disc) > cv2.erode(inside, disc)
+        assert np.abs(each.matte - 255 * wanted)[around].mean() <= most, each.frame
 
 
 def test_it_is_quiet_where_nothing_moves():

@@ -33,7 +33,7 @@ from ...media.outlining import traced
 from . import carrying
 
 CONFIDENCE = "confidence "  # what a file's description says (carrying.Carried)
-VERSION = 4  # raise it when mattes of the same drawings change
+VERSION = 5  # raise it when mattes of the same drawings change
 TRUSTED = 0.2  # confidence below which a lone drawing's mattes fade out
 FADE = 4  # frames that this takes
 BLOCK = 20  # frames beyond a drawing that are carried together

@@ -343,19 +343,20 @@ def refined(picture: np.ndarray, share: np.ndarray) -> np.ndarray:
     Returns:
         The matte, (H, W) float32, 0 to 1.
     """
-    height, width = picture.shape[:2]
-    scale = width / share.shape[1]
-    matte = np.zeros((height, width), np.float32)
+    scale = picture.shape[1] / share.shape[1]
+    coarse = int(scale)
+    matte = np.zeros(picture.shape[:2], np.float32)
     if (box := box_around(share, EXPLAINING[0])) is None:
         return matte
-    whole = cv2.resize(share, (width, height), interpolation=cv2.INTER_LINEAR) if scale != 1 else share
+    whole = cv2.resize(share, picture.shape[1::-1], interpolation=cv2.INTER_LINEAR) if scale != 1 else share
     rows, columns = (slice(int(part.start * scale), int(np.ceil(part.stop * scale))) for part in box)
     guide, values = np.ascontiguousarray(picture[rows, columns]), np.ascontiguousarray(whole[rows, columns])
-    values = cv2.ximgproc.guidedFilter(guide, values, max(round(RADIUS * scale), 1), SMOOTHNESS * 255**2)
+    near = round(RADIUS * scale / coarse)  # in pixels of the smaller picture, as OpenCV counts
+    values = cv2.ximgproc.guidedFilter(guide, values, near, SMOOTHNESS * 255**2, scale=1 / coarse)
     values = np.clip((values - INSIDE) / EDGE + 0.5, 0, 1)
     light = cv2.LUT(guide, _LIGHT)
     for radius in EXPLAINING:
-        values = _explained(light, values, max(round(radius * scale), 1), max(int(scale), 1))
+        values = _explained(light, values, round(radius * scale), coarse)
     matte[rows, columns] = values
     return matte
 
@@ -376,7 +377,7 @@ def _explained(light: np.ndarray, values: np.ndarray, radius: int, coarse: int) 
     Returns:
         The new matte, (h, w).
     """
-    found = cv2.ximgproc.guidedFilter(light, values, radius, EXACT * 255**2, scale=1 / coarse)
+    found = cv2.ximgproc.guidedFilter(light, values, round(radius / coarse), EXACT * 255**2, scale=1 / coarse)
 
     def mean(each: np.ndarray) -> np.ndarray:
         return cv2.blur(each, (2 * radius + 1, 2 * radius + 1))

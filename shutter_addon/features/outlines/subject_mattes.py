@@ -540,8 +540,7 @@ class SubjectMattes(CarriedMattes):
         """Return a frame as displayed, (H, W, 3) uint8, and as working picture (h, w, 3). The last one is kept."""
         if self._before is None or self._before[0] != frame:
             picture = self._picture(frame)
-            small = flow.resized(picture, carrying.working_size(self.width, self.height))
-            self._before = frame, picture, small
+            self._before = frame, picture, flow.resized(picture, carrying.working_size(self.width, self.height))
         return self._before[1:]
 
     def _carried_to(self, frame: int) -> Found:
