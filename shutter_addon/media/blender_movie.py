@@ -111,10 +111,7 @@ def lend(command: list[str] | None) -> None:
     """
     BlenderMovie.decoder.command = command
     if (process := BlenderMovie.decoder.process) is not None:
-        with (
-            _killed_after(ENDING, process),
-            BlenderMovie.decoder.asking,
-        ):  # which a thread may hold that waits for an answer
+        with _killed_after(ENDING, process), BlenderMovie.decoder.asking:  # held by a thread that waits for an answer
             _end()
 
 
