@@ -21,7 +21,7 @@ from functools import reduce
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .matte_grid import block_sums
+from .matte_grid import block_sums, box_around
 
 # The share of the exposure that has to be background.
 CLEAR = 1 / 16
@@ -62,11 +62,10 @@ def separated(colors: np.ndarray, matte: np.ndarray) -> tuple[np.ndarray, np.nda
     """
     own, behind = colors.copy(), colors.copy()
     mixed = (matte > 0) & (matte < 1)
-    if not mixed.any():
-        return own, behind
     height = len(matte)
     wide, near = max(round(height * WIDE), 2), max(round(height * NEAR), 1)
-    box = tuple(_around(mixed.any(axis=1 - axis), wide + near) for axis in (0, 1))
+    if (box := box_around(mixed, wide + near)) is None:
+        return own, behind
     # Planes of colours (C, h, w), which NumPy sums faster than pixels.
     picture, m = np.moveaxis(colors[box], -1, 0).copy(), matte[box].astype(np.float32)
     first, second = _nearer(picture, m, *_surroundings(picture, picture, m, wide, np.ogrid[: len(m), : m.shape[1]]))
@@ -81,12 +80,6 @@ def _nearer(picture: np.ndarray, matte: np.ndarray, own: np.ndarray, behind: np.
     """Return subject and background colours (C, …) corrected so that they mix to the picture."""
     left = picture - matte * own - (1 - matte) * behind
     return own + matte * left, behind + (1 - matte) * left
-
-
-def _around(mixed: np.ndarray, reach: int) -> slice:
-    """Return the rows, or columns, from the first to the last mixed pixel, extended by `reach`."""
-    places = np.flatnonzero(mixed)
-    return slice(max(int(places[0]) - reach, 0), int(places[-1]) + reach + 1)
 
 
 def _surroundings(
