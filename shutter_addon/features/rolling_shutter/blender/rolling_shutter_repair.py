@@ -164,7 +164,7 @@ def find_readout(self: Operator, _context: Context, effect: PropertyGroup) -> No
     scene, strip, columns = self.edit, self.effect_strip, self.reads == "COLUMNS"
     frame = scene.frame_current
     index = snapshot.source_frames(scene, effect, strip, (frame,))[frame]
-    with ShotSource(source_media.open_media(strips.source_of(scene, effect, strip))) as medium:
+    with ShotSource(source_media.spec(strips.source_of(scene, effect, strip)).open()) as medium:
         half = readout.FRAMES // 2
         low, high = max(index - half, 0), min(index + half, medium.count)
         shot = medium.around(index, low, high - 1)
