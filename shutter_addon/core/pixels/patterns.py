@@ -15,9 +15,9 @@ def marks(index: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
     The first shutter's pattern is plain. Patterns repeat after COUNT shutters.
     """
-    across, up = _within(x, _PERIOD) < _WIDTH, _within(y, _PERIOD) < _WIDTH
-    rising, falling = _within(x - y + _OFF, _SLANTED) < _WIDTH, _within(x + y + _OFF, _SLANTED) < _WIDTH
-    apart = np.hypot(_within(x, _PERIOD) - _PERIOD / 2, _within(y, _PERIOD) - _PERIOD / 2)
+    across, up = x % _PERIOD < _WIDTH, y % _PERIOD < _WIDTH
+    rising, falling = (x - y + _OFF) % _SLANTED < _WIDTH, (x + y + _OFF) % _SLANTED < _WIDTH
+    apart = np.hypot(x % _PERIOD - _PERIOD / 2, y % _PERIOD - _PERIOD / 2)
     patterns = across & False, rising, apart < _RADIUS, falling, up, across, rising | falling, across | up
     return patterns[index % COUNT]
 
@@ -32,7 +32,3 @@ def painted(color: Sequence[float], index: int, x: np.ndarray, y: np.ndarray) ->
     """Return a colour (3,) with a pattern at places as for `marks`: (..., 3), display code values."""
     share = STRENGTH * marks(index, x, y)[..., None]
     return (1 - share) * np.asarray(color) + share * np.array(ink(color))
-
-
-def _within(place: np.ndarray, period: float) -> np.ndarray:
-    return place - np.floor(place / period) * period
