@@ -115,11 +115,6 @@ def lend(command: list[str] | None) -> None:
             _end()
 
 
-def is_lent() -> bool:
-    """Return whether movies can be decoded this way."""
-    return BlenderMovie.decoder.command is not None
-
-
 def ask(wanted: dict) -> tuple[dict, np.ndarray | None]:
     """Return the process's answer, and a frame in new memory if there is one; raise MediaError with its message."""
     with BlenderMovie.decoder.asking:
