@@ -145,9 +145,7 @@ def test_shapes():
     t = shutters.trail(100, 0.25)
     assert t[0] == 1
     assert t[25] == pytest.approx(np.exp(-1))
-
-
-def test_presets_have_parameters_of_their_own():
+    # Presets have parameters of their own.
     assert shutters.preset_bars("STUTTER", 8).tolist() == [1, 0, 0, 0, 1, 0, 0, 0]
     assert shutters.preset_bars("CUTS", 8).tolist() == [1, 0, 1, 0, 1, 0, 1, 0]
     assert shutters.preset_bars("ANGLE_90", 8).tolist() == [1, 1, 0, 0, 0, 0, 0, 0]
