@@ -91,7 +91,7 @@ def _after_undo(*_) -> None:
     revision.changed()
     reconciling.find_lost()
     revision.edit.replaced += 1
-    invalidation.drop_frames()
+    strips.invalidate_all()
     sessions.drop_removed()
     sharp_frame.give_back(bpy.context)
     shown_annotations.follow()
@@ -192,7 +192,7 @@ def register() -> None:
         getattr(bpy.app.handlers, name).append(persistent(function))
     sys.excepthook = partial(_uncaught, sys.excepthook)
     # Frames that the sequencer kept lack the effects. While an extension registers, Blender's data is not available.
-    main_thread.later(invalidation.drop_frames)
+    main_thread.later(strips.invalidate_all)
 
 
 def unregister() -> None:
@@ -201,9 +201,5 @@ def unregister() -> None:
         getattr(bpy.app.handlers, name).remove(function)
     if isinstance(ours := sys.excepthook, partial) and ours.func is _uncaught:  # not one that was installed later
         sys.excepthook = ours.args[0]
-    operator_bases.end_all()
-    edit_feed.end()
-    sessions.forget()
-    source_media.look_again()
-    reconciling.forget()
+    _forget_file()
     undelete.forget()

@@ -114,16 +114,8 @@ def lend(command: list[str] | None) -> None:
     """
     BlenderMovie.decoder.command = command
     if (process := BlenderMovie.decoder.process) is not None:
-        with (
-            _killed_after(ENDING, process),
-            BlenderMovie.decoder.asking,
-        ):  # which a thread may hold that waits for an answer
+        with _killed_after(ENDING, process), BlenderMovie.decoder.asking:  # held by a thread that waits for an answer
             _end()
-
-
-def is_lent() -> bool:
-    """Return whether a second Blender can decode movies: whether there is a command that starts it."""
-    return BlenderMovie.decoder.command is not None
 
 
 def ask(wanted: dict) -> tuple[dict, np.ndarray | None]:

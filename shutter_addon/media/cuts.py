@@ -190,6 +190,11 @@ def _whole(picture: np.ndarray) -> np.ndarray:
     return np.rint(picture).clip(0, 255).astype(np.uint8)
 
 
+# The lowest frequencies of the orthonormal discrete cosine transform, a row for each.
+_WAVES = np.cos(np.pi / (2 * BITS) * np.outer(np.arange(BITS), np.arange(2 * BITS) + 0.5)) * np.sqrt(1 / BITS)
+_WAVES[0] /= np.sqrt(2)
+
+
 def _hash(picture: np.ndarray) -> np.ndarray:
     """Return the hash of a frame's small picture: which of its low frequencies exceed their median.
 
@@ -199,8 +204,7 @@ def _hash(picture: np.ndarray) -> np.ndarray:
     grey = (_whole(picture) @ _GREY + (1 << 14)) >> 15
     down, right = (_means(length, 2 * BITS) for length in grey.shape)
     small = np.rint(down @ grey @ right.T)  # like OpenCV's INTER_AREA except for rounding
-    waves = _waves(2 * BITS)[:BITS]
-    low = np.float32(waves @ np.float32(small / max(small.max(), 1)) @ waves.T)
+    low = np.float32(_WAVES @ np.float32(small / max(small.max(), 1)) @ _WAVES.T)
     return np.greater(low, np.median(low))
 
 
@@ -210,14 +214,6 @@ def _means(length: int, size: int) -> np.ndarray:
     scale = length / size
     edges = np.clip(np.arange(length + 1), *(np.arange(size)[:, None] * scale + end for end in (0, scale)))
     return np.diff(edges) / scale
-
-
-@lru_cache(2)
-def _waves(size: int) -> np.ndarray:
-    """Return the matrix (size, size) of the orthonormal discrete cosine transform, a row for each frequency."""
-    waves = np.cos(np.pi / size * np.outer(np.arange(size), np.arange(size) + 0.5)) * np.sqrt(2 / size)
-    waves[0] /= np.sqrt(2)
-    return waves
 
 
 class ShotSource(SourceWrapper):

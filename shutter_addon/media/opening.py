@@ -15,7 +15,7 @@ import numpy as np
 from ..core.frames.frame_source import FrameSource, SourceWrapper
 from ..core.frames.light import REC709
 from ..core.messages import MediaError
-from .blender_movie import BlenderMovie, is_lent
+from .blender_movie import BlenderMovie
 from .color import in_colorspace
 from .files import check_file, pyav_missing
 from .reduced import ProxySource, fits, smaller
@@ -88,7 +88,7 @@ def _opened_movie(path: Path, stream: int, deinterlace: bool = False, divisor: i
     """Open a movie by PyAV or, where that is missing, by a second Blender. Arguments and errors as for open_source."""
     if pyav_missing():
         check_file(path)
-        if stream or not is_lent():
+        if stream or BlenderMovie.decoder.command is None:
             raise MediaError(
                 f"{path.name}: movies need the Python package PyAV ({pyav_missing()}); "
                 "install the zip of Virtual Shutter that is made for your system, or use an image sequence"

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from shutter_addon.blender.data import consistency, recipe_import, strips
 from shutter_addon.blender.editing import bar_edits, shutter_edits
-from shutter_addon.blender.interface import bar_editor
+from shutter_addon.blender.interface import bar_editor, probe_gizmo
 from shutter_addon.core.model import shutters
 
 WINDOWS = 1, 2, 8, 32, 256
@@ -168,3 +168,15 @@ def test_a_snapped_stroke_gives_tenths(stroke):
     assert snapped[changed] * 10 == pytest.approx(np.round(snapped[changed] * 10), abs=1e-9)
     assert np.abs(snapped - free).max() <= 0.1 + 1e-9
     assert (snapped >= 0).all()
+
+
+@given(st.floats(0, 1), st.floats(0, 1), st.integers(1, 8), st.floats(0.5, 2))
+def test_the_box_lies_in_the_region_and_beside_the_point(bpy, x, y, count, unit):
+    size = 1600, 1000
+    point = x * size[0], y * size[1]
+    frame, bars, lines = probe_gizmo.layout(point, size, count, unit)
+    left, bottom, right, top = frame
+    assert 0 <= left < bars[0] < bars[2] < right <= size[0]
+    assert 0 <= bottom < lines[-1] <= lines[0] < bars[1] < bars[3] < top <= size[1]
+    assert len(lines) == count
+    assert not (left < point[0] < right and bottom < point[1] < top)

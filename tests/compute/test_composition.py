@@ -1,5 +1,7 @@
 """Both devices against the float64 reference: random footage, random shutters, every option."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -12,7 +14,7 @@ from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
 from shutter_addon.core.frames.frame_source import FrameSource
 from shutter_addon.core.model import shutters, windows
-from shutter_addon.core.model.frame_state import FrameState, Options
+from shutter_addon.core.model.frame_state import Combine, Following, FrameState, Options
 from shutter_addon.core.model.scribbles import Shape
 from shutter_addon.core.pixels import compositor
 
@@ -308,3 +310,73 @@ def test_quick_pictures_leave_no_trace_in_others(device):
         quick = device.read(renderer.draw(Request(0, moment, quick=True)))
     np.testing.assert_allclose(quick, expected, atol=0.1)
     assert np.array_equal(renderer.picture(Request(0, moment)), expected)
+
+
+POINTS = [(0.001, 0.001), (0.999, 0.001), (0.31, 0.74), (0.65, 0.22), (0.5, 0.5)]
+
+
+@pytest.fixture
+def renderer(blender_device):
+    return Renderer(GPUCompositor(blender_device), footage(np.random.default_rng(3)))
+
+
+@pytest.mark.parametrize("interpolation", ["displacement", "value"])
+@pytest.mark.parametrize("aggregate", [1, 2, 4])
+@pytest.mark.parametrize("count", [2, 6])
+def test_a_point_shows_its_pixels_coefficients_and_shutter(renderer, interpolation, aggregate, count):
+    from shutter_addon.blender.interface.probe_gizmo import probed_at
+
+    options = {"shapes": SHAPES if count > 2 else SHAPES[::2], "interpolation": interpolation, "aggregate": aggregate}
+    request, source = Request(4, state(np.random.default_rng(count), count=count, **options)), renderer.source
+    values = renderer.coefficients(request)
+    for x, y in POINTS:
+        row, column = int((1 - y) * source.height) // aggregate, int(x * source.width) // aggregate
+        coefficients, bars = probed_at(renderer, request, (x, y))
+        assert np.abs(coefficients - values[:, row, column]).max() < 1e-3
+        assert coefficients.sum() == pytest.approx(1)
+        between = shutters.INTERPOLATIONS[interpolation]
+        assert bars == pytest.approx(between(request.state.bars, coefficients))
+
+    for point in ((-1, -1), (1.0, 0.5), (0.5, 0.0), (0.5, 1.01)):  # beside the picture
+        assert probed_at(renderer, request, point) is None
+
+
+def combining(rng, *combines, window=9, **options):
+    return dataclasses.replace(state(rng, window, (), len(combines), **options), combines=combines)
+
+
+@pytest.mark.parametrize("mode", ["lightest", "darkest", "median"])
+@pytest.mark.parametrize("window", [2, 64, 256])
+def test_windows_of_any_length(device, mode, window):
+    """A long median of any light takes more iterations than a software renderer has."""
+    rng = np.random.default_rng(window)
+    moment = combining(rng, *[Combine(mode)] * 2, window=window)
+    kind = {"dtype": np.float32, "transfer": "linear"} if (mode, window) == ("median", 256) else {}
+    check(device, footage(rng, count=window + 3, size=(9, 7), **kind), moment, 1)
+
+
+@pytest.mark.parametrize("follows", [False, True])
+def test_the_shown_frame_may_be_left_out(device, follows):
+    """Played in reverse, a filmed frame begins with its last moment, which the clip's end does not have."""
+    rng = np.random.default_rng(6)
+    moment = combining(rng, Combine("lightest", threshold=0.4, softness=0.3), edges="shorten", step=4)
+    if follows:
+        shifts = np.arange(20)[:, None] * (0.7 - 0.3j)
+        moment = dataclasses.replace(moment, following=Following(0, np.ones((20, 1), complex), shifts))
+    source = footage(rng)
+    source.frames[..., :3] //= 2
+    check(device, source, moment, 19, -1)
+
+
+# What the reference has to be
+
+
+def test_a_median_is_continuous():
+    """Between the samples beside the middle, as their weights change by a little."""
+    values = np.array([0.0, 1.0])
+    shares = np.linspace(0.49, 0.51, 4001)
+    found = compositor.weighted_median(np.broadcast_to(values[:, None], (2, 4001)), np.stack([shares, 1 - shares]))
+    assert found[0] == 1
+    assert found[-1] == 0
+    assert found[2000] == pytest.approx(0.5, abs=1e-6)
+    assert np.abs(np.diff(found)).max() < 0.03

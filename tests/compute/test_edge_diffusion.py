@@ -194,23 +194,18 @@ def test_cells_may_be_larger_than_pixels(film, side, solve):
     np.testing.assert_allclose(solve(labels, 4, guide, 1.0), wanted, rtol=0, atol=LEVEL)
 
 
-def test_without_a_guide_nothing_is_left_of_one(solve):
+def test_what_was_solved_before_does_not_change_a_bit(solve):
+    """Without a guide, nothing is left of one; and where nothing is free any more, nothing of what was."""
     labels, count, guide = SCENES["people, 8 shutters"]
     plain = solve(labels, count).copy()
     solve(labels, count, guide, 1.0)
     np.testing.assert_array_equal(solve(labels, count, warm=True), plain)
-
-
-def test_what_was_solved_before_does_not_change_a_bit(solve):
     labels, count, fine = SCENES["bunny"]
     for guide in (fine, coarse(BUNNY, 4, WIDTH, HEIGHT)):
         first = solve(labels, count, guide, 1.0).copy()
         solve(np.full_like(labels, 2) * (labels[::-1] == 0), count, guide[::-1], 0.5)
         np.testing.assert_array_equal(solve(labels, count, guide, 1.0, warm=True), first)
-
-
-def test_where_nothing_is_free_any_more_nothing_is_left(solve):
-    """Half of the picture becomes a scribble, which the sums of conjugate gradients must not notice."""
+    # Half of the picture becomes a scribble, which the sums of conjugate gradients must not notice.
     labels, count, guide = shapes(13, 4, 256, 192), 4, film(*PEOPLE, 256, 192)
     wide = labels.copy()
     wide[:, 100:] = 3

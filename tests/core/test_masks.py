@@ -1,4 +1,4 @@
-"""What masks cover beside what tests/blender/test_mask_reading.py compares with Blender's own Mask strip."""
+"""What masks and ramps cover, beside what tests/blender/test_mask_reading.py compares with Blender's own Mask strip."""
 
 from dataclasses import replace
 
@@ -7,7 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from shutter_addon.core.model import mattes
 from shutter_addon.core.model.masks import MaskLayer, MaskShape, MaskSpline
+from shutter_addon.core.model.mattes import Ramp
+from shutter_addon.core.model.motions import Placement
 
 RECTANGLE = ((0.25, 0.35), (0.25, 0.65), (0.75, 0.65), (0.75, 0.35))
 
@@ -78,3 +81,32 @@ def test_no_mask_is_too_odd(polygons, data):
     options = {name: data.draw(st.booleans()) for name in ("holes", "invert")}
     value = covered(splines, (16, 12), fill_solver=data.draw(st.sampled_from(["CDT", "SWEEP_LINE"])), **options)
     assert 0 <= value.min() <= value.max() <= 1
+
+
+WIDTH, HEIGHT = 64, 36
+
+
+@pytest.mark.parametrize("kind", ["linear", "radial", "angle"])
+def test_a_negative_scale_turns_a_ramp_round(kind):
+    place = {"location": (0.1, 0.05), "rotation": 20.0}
+    found = Ramp(kind, Placement(scale=-0.5, **place))
+    turned = Ramp(kind, Placement(scale=0.5, **place | {"rotation": 200.0}))
+    assert np.abs(found.values(WIDTH, HEIGHT) - turned.values(WIDTH, HEIGHT)).max() < 1e-6
+
+
+def test_values_stay_within_0_and_1():
+    rng = np.random.default_rng(1)
+    for _ in range(50):
+        kind = ("linear", "radial", "angle")[rng.integers(3)]
+        numbers = tuple(rng.normal(0, 3, 2)), rng.normal(0, 1e4), rng.normal(0, 2) * (rng.random() > 0.1)
+        found = Ramp(kind, Placement(*numbers)).values(9, 14)
+        assert found.dtype == np.float32
+        assert 0 <= found.min() <= found.max() <= 1
+
+
+def test_blended_leaves_what_it_is_given():
+    coefficients = np.array([1.0, 0.0]).reshape(2, 1, 1)
+    matte = mattes.Matte(1, Ramp("linear"))
+    found = mattes.blended(coefficients, (matte,), [matte.content.values(4, 2)])
+    assert found.shape == (2, 2, 4)
+    assert coefficients.ravel().tolist() == [1, 0]

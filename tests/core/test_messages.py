@@ -1,6 +1,8 @@
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from shutter_addon.core.frames import frame_ranges
 from shutter_addon.core.messages import LONGEST, sentence, signed
 
 
@@ -22,3 +24,10 @@ def test_every_sentence_is_one_line_that_can_be_written(text, longest):
     assert len(said) <= longest
     assert said.isprintable()
     said.encode("utf-8")
+
+
+@pytest.mark.parametrize(
+    ("frames", "words"), [([3], "frame 3"), ([5, 4], "frames 4 to 5"), ([9, 1, 3, 2, 12], "frames 1 to 3, 9, 12")]
+)
+def test_frames_in_words(frames, words):
+    assert frame_ranges.in_words(frames) == words

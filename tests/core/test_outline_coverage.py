@@ -1,4 +1,7 @@
-"""What outlines enclose, and how they are pulled. tests/differential has how much they cover of a pixel."""
+"""What outlines enclose, how they are pulled, and how curves of successive drawings are paired.
+
+tests/differential has how much they cover of a pixel.
+"""
 
 import numpy as np
 import pytest
@@ -6,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shutter_addon.core import scanlines
-from shutter_addon.core.model import outlines
+from shutter_addon.core.model import outlines, scribbles
 
 SQUARE = [[(0.25, 0.25), (0.75, 0.25), (0.75, 0.75), (0.25, 0.75)]]
 
@@ -17,7 +20,14 @@ def test_what_encloses_nothing(strokes):
 
 
 ASPECT = 2.0
-CIRCLE = tuple((0.5 + 0.1 * np.cos(a), 0.5 + 0.2 * np.sin(a)) for a in np.linspace(0, 2 * np.pi, 40, endpoint=False))
+
+
+def circle(x, y, radius, points=40, turned=1, start=0.0):
+    angle = start + turned * np.linspace(0, 2 * np.pi, points, endpoint=False)
+    return [(x + radius * np.cos(a) / ASPECT, y + radius * np.sin(a)) for a in angle]
+
+
+CIRCLE = tuple(circle(0.5, 0.5, 0.2))
 
 
 def test_the_nearest_curve():
@@ -61,3 +71,29 @@ def test_many_points_take_no_more_memory(monkeypatch):
     monkeypatch.setattr(outlines, "_CROSSINGS", 10_000)  # likewise
     assert (outlines.coverage(strokes, 64, 48) == whole).all()
     assert max(len(rows) for rows, *_ in looked) <= 10_000 < sum(len(rows) for rows, *_ in looked)
+
+
+def test_what_is_drawn_is_covered_and_goes_straight_in_between():
+    """Whichever way round it is drawn, from wherever, with however many points, and a hole stays one."""
+    large, hole, apart = circle(0.3, 0.5, 0.2), circle(0.3, 0.5, 0.1), circle(0.7, 0.5, 0.1)
+    second = [circle(0.72, 0.5, 0.1, 25, -1, 2.0), circle(0.4, 0.5, 0.15), circle(0.4, 0.5, 0.25, 70, -1, 1.0)]
+    drawn = [[large, hole, apart], second]
+    ordered = outlines.in_order(drawn, ASPECT)
+    for curves, found in zip(drawn, ordered, strict=True):
+        assert np.abs(outlines.coverage(found, 320, 160) - outlines.coverage(curves, 320, 160)).mean() < 0.002
+    between = [circle(0.35, 0.5, 0.225), circle(0.35, 0.5, 0.125), circle(0.71, 0.5, 0.1)]
+    found = scribbles.between_strokes(*ordered, 0.5, ASPECT)
+    assert np.abs(outlines.coverage(found, 320, 160) - outlines.coverage(between, 320, 160)).mean() < 0.002
+
+
+def test_what_stays_is_itself_where_another_curve_goes():
+    """The larger one leaves the picture and comes back; what lies far away is another one."""
+    gone, stays = circle(0.2, 0.5, 0.15), circle(0.8, 0.5, 0.05)
+    first, second, third = outlines.in_order([[gone, stays], [stays], [gone, stays]], ASPECT)
+    for found in (scribbles.between_strokes(first, second, 0.5, ASPECT), scribbles.between_strokes(second, third, 0.5)):
+        assert np.abs(np.mean(found[0], axis=0) - (0.8, 0.5)).max() < 0.01
+
+
+@pytest.mark.parametrize("drawn", [[], [[]], [[[(0.1, 0.1), (0.5, 0.5)]]]])
+def test_nothing_is_no_curve(drawn):
+    assert not any(outlines.in_order(drawn, ASPECT))

@@ -101,9 +101,7 @@ def add_stroke(drawing: AnnotationFrame, points: np.ndarray) -> None:
     stroke = drawing.strokes.new()
     stroke.display_mode = "2DSPACE"
     stroke.points.add(len(points))
-    places = np.zeros((len(points), 3), dtype=np.float32)
-    places[:, :2] = points
-    stroke.points.foreach_set("co", places.ravel())
+    stroke.points.foreach_set("co", np.pad(points, ((0, 0), (0, 1))).astype(np.float32).ravel())
 
 
 def layer_of(effect: PropertyGroup, region: PropertyGroup, name: str = "layer") -> Any:

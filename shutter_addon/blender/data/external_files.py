@@ -48,6 +48,13 @@ def absolute(owner: ID | Strip, path: str) -> Path:
     return Path(bpy.path.abspath(path, library=library))
 
 
+def relative(path: str) -> str:
+    """Return a path relative to the open .blend file, if it lies on the same drive."""
+    with suppress(ValueError):
+        return bpy.path.relpath(path)
+    return path
+
+
 def faults(scene: Scene, frames: range, *, sources: bool) -> list[str]:
     """Return a sentence for each file that is missing or unreadable and that pictures at these timeline frames need.
 

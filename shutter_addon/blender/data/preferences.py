@@ -21,11 +21,6 @@ DEVICES = (
 )
 
 
-def _model_changed(_preferences: bpy.types.AddonPreferences, _context: Context) -> None:
-    for scene in bpy.data.scenes:
-        strips.invalidate(scene)
-
-
 class ShutterPreferences(bpy.types.AddonPreferences):
     bl_idname = ADDON
 
@@ -47,7 +42,7 @@ class ShutterPreferences(bpy.types.AddonPreferences):
         name="Subject Model",
         description="ONNX file of another model that finds subjects: one picture in, one mask out."
         " Empty: the one that Virtual Shutter brings",
-        update=_model_changed,
+        update=strips.invalidate_all,
         subtype="FILE_PATH",
     )
 

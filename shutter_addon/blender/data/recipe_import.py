@@ -1,7 +1,6 @@
 """Write a recipe into an effect's Blender data: shutters, regions, strokes, keys and options."""
 
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,7 @@ from ...core.recipes import recipe
 from ...media.files import check_name
 from ...media.opening import MatteFile
 from ...media.sequence import IMAGE_SUFFIXES
-from . import fcurves, strips
+from . import external_files, fcurves, strips
 from .annotations import LAYERS, NOT_THIS, add_stroke, annotation, picture_size, picture_to_image
 
 _KINDS = {model.MatteRegion: "MATTE", model.OutlineRegion: "OUTLINE", model.SubjectRegion: "SUBJECT"}
@@ -115,20 +114,14 @@ def matte_image(path: str | Path, channel: str = "luminance"):
     """
     with MatteFile(path=Path(path), channel=channel).open() as matte:
         found, count = Path(matte.path), matte.count
-    name = _kept(check_name(found))
+    name = check_name(found)
+    if bpy.data.filepath and bpy.context.preferences.filepaths.use_relative_paths:
+        name = external_files.relative(name)
     is_sequence = found.suffix.lower() in IMAGE_SUFFIXES and count > 1
     image = bpy.data.images.load(name, check_existing=not is_sequence)  # an existing image may be a single one
     if is_sequence:
         image.source = "SEQUENCE"
     return image
-
-
-def _kept(name: str) -> str:
-    """Return a path as Blender stores it: relative to the saved file, if the preferences say so and it can be."""
-    if bpy.data.filepath and bpy.context.preferences.filepaths.use_relative_paths:
-        with suppress(ValueError):  # another drive
-            return bpy.path.relpath(name)
-    return name
 
 
 def clear(scene, effect) -> None:

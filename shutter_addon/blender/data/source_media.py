@@ -155,15 +155,6 @@ def _spec(strip: Strip, key: tuple) -> SourceSpec:
     return SourceSpec(key=key, path=path(0), files=files, options=options)
 
 
-def open_media(strip: Strip) -> FrameSource:
-    """Open a strip's footage, with colors and alpha as the strip shows them.
-
-    Raises:
-        MediaError: It cannot be read.
-    """
-    return spec(strip).open()
-
-
 def files(strip: Strip) -> list[Path]:
     """Return the files of a movie, image or clip strip, including missing ones and ones that effects cannot use.
 

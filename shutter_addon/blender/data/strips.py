@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.types import PropertyGroup, Scene, Strip
+from bpy.types import Context, PropertyGroup, Scene, Strip
 
 from ...core import revision
 from ...core.messages import EffectError
@@ -181,6 +181,12 @@ def invalidate(scene: Scene, effect_scene: Scene | None = None) -> None:
     for strip in effect_strips(scene):
         if effect_scene is None or strip.scene == effect_scene:
             strip.invalidate_cache("RAW")  # drops what was composed from it, too
+
+
+def invalidate_all(_owner: object = None, _context: Context | None = None) -> None:
+    """Drop the frames that Blender's sequencer keeps of all effects."""
+    for scene in bpy.data.scenes:
+        invalidate(scene)
 
 
 def used_regions(effect: PropertyGroup) -> list:

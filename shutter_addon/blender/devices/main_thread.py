@@ -169,7 +169,9 @@ def serve(seconds: float = _LEAST) -> bool:
         False if calls wait that cannot be made, because Blender's GPU cannot be used yet.
     """
     if not has_context():
-        _redraw()
+        for window in bpy.context.window_manager.windows:  # so that Blender's GPU can be used again
+            for area in window.screen.areas:
+                area.tag_redraw()
         time.sleep(_GAP)
         return _main.calls.empty()
     end = time.monotonic() + seconds
@@ -220,13 +222,6 @@ def look() -> bool:
     serve(min(max(time.monotonic() - _main.looked, _LEAST), _MOST))
     _main.looked = time.monotonic()
     return True
-
-
-def _redraw() -> None:
-    """Have all windows redrawn, so that Blender's GPU can be used again."""
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            area.tag_redraw()
 
 
 def register() -> None:

@@ -106,7 +106,7 @@ def _take(source: Strip) -> FrameSource:
     Raises:
         MediaError: The source's footage cannot be read.
     """
-    medium = source_media.open_media(source)
+    medium = source_media.spec(source).open()
     medium.close()
     source.virtual_shutter_source = source.virtual_shutter_source or uuid.uuid4().hex
     if medium.alpha != "opaque" and not source.mute:

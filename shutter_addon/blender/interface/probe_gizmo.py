@@ -88,9 +88,8 @@ class SHUTTER_GT_probe(Gizmo):
         if shown is None or (seen := _view(context)) is None:
             return
         try:
-            render = sessions.of_drawing()
             request = previews.request_of(context, shown)
-            probed = probed_at(render.renderer(request), request, at)
+            probed = probed_at(sessions.of_drawing().renderer(request), request, at)
         except effect_source.FAULTS:  # the live preview shows the error
             return
         if probed is not None:

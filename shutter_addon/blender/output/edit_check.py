@@ -94,7 +94,7 @@ def _check_footage(scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
         UserError: It is gone, or has changed.
     """
     source = strips.source_of(scene, effect, strip)
-    with source_media.open_media(source) as medium:
+    with source_media.spec(source).open() as medium:
         size = medium.width, medium.height
         saved = effect.scene.render.resolution_x, effect.scene.render.resolution_y
         if saved != size:

@@ -99,7 +99,7 @@ def _effect(scene: Scene, effect: PropertyGroup, strip: Strip) -> Iterator[str]:
         yield from (f"  - {times} × {what}, {line}" for line, times in Counter(map(_options, groups)).items())
     frame = min(max(scene.frame_current, strip.left_handle), strip.right_handle - 1)
     try:
-        with source_media.open_media(strips.source_of(scene, effect, strip)) as medium:
+        with source_media.spec(strips.source_of(scene, effect, strip)).open() as medium:
             size = f"{medium.width}×{medium.height}, {medium.count} frames"
             yield f"  - footage: {medium.file_kind}, {size}, read as {medium.dtype}, alpha {medium.alpha}"
         snapshot.take(scene, effect, strip, (frame,)).effect.at(frame)

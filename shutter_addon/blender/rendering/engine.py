@@ -19,7 +19,6 @@ from .render_job import Where
 class VirtualShutterEngine(bpy.types.RenderEngine):
     bl_idname = ENGINE
     bl_label = "Virtual Shutter"
-    bl_use_preview = False
 
     def render(self, depsgraph: Depsgraph) -> None:
         if render_job.job.cancelling:

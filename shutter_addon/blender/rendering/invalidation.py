@@ -75,12 +75,6 @@ def drop_reduced() -> None:
     _drop(_frames.reduced)
 
 
-def drop_frames() -> None:
-    """Drop the frames that the sequencer keeps of all effects."""
-    for scene in bpy.data.scenes:
-        strips.invalidate(scene)
-
-
 def _drop(noted: set[int]) -> None:
     """Drop the frames of the effect scenes with these session_uids, and empty the set."""
     uids = {noted.pop() for _ in range(len(noted))}

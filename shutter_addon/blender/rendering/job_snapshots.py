@@ -100,31 +100,28 @@ def of(effect_scene: Scene, scene_frame: float, ended: Callable[[], bool] | None
         if isinstance(taken, Exception):
             raise taken.with_traceback(None)
         return taken, taken.timeline_frame(scene_frame)
-    if bpy.app.background:
-        return _of_film(effect_scene, scene_frame)
     scene, effect, strip = strips.find_effect(effect_scene, scene_frame)
     frame = strips.timeline_frame(strip, scene_frame)
-    return invalidation.current(scene, effect, strip, frame), frame
+    taken_by = _of_film if bpy.app.background else invalidation.current
+    return taken_by(scene, effect, strip, frame), frame
 
 
-def _of_film(effect_scene: Scene, scene_frame: float) -> tuple[Snapshot, float]:
-    """Return what `of` returns, in the background: a kept snapshot if it has the frame, else a new one.
+def _of_film(scene: Scene, effect: PropertyGroup, strip: Strip, frame: float) -> Snapshot:
+    """Return the snapshot for a timeline frame in the background: a kept one if it has the frame, else a new one.
 
     From a film's second frame on, it has all frames of the film.
     """
-    scene, effect, strip = strips.find_effect(effect_scene, scene_frame)
-    frame = strips.timeline_frame(strip, scene_frame)
     key, frames = (effect.scene.session_uid, strip.name), {frame, frame + scene.frame_step}
     is_again = key in job.film_data.read and not render_job.scripts_act()
     if is_again and (known := job.film_data.read[key]) is not None and frame in known.frames:
-        return known, frame
+        return known
     if is_again:
         parts = [part for part in strips.effect_strips(scene) if part.scene == effect.scene]
         frames |= asked_frames(scene, parts, scene.session_uid == render_job.job.film)
     taken = snapshot.take(scene, effect, strip, frames)
     if render_job.runs():
         job.film_data.read[key] = taken if is_again else None
-    return taken, frame
+    return taken
 
 
 def _late(uid: int, scene_frame: float) -> Snapshot:

@@ -324,7 +324,7 @@ def refine() -> None:
 def show_carried() -> None:
     """Have previews drawn again after mattes of outlines were tracked."""
     sessions.SESSIONS.window.keep(set())
-    invalidation.drop_frames()
+    strips.invalidate_all()
     preview_areas.redraw()
 
 

@@ -58,14 +58,9 @@ SMOOTH = (
 )
 
 
-STROKES = (
+DRAWN = (
     ("LINE", "Line", "The strokes themselves, as wide as the region's width"),
     ("LASSO", "Lasso", "Everything that the strokes enclose"),
-)
-
-
-DRAWN = (
-    *STROKES,
     ("OUTLINE", "Outline", "A drawn matte: everything inside closed curves, exact to the pixel"),
     ("SUBJECT", "Subject", "What a model finds under strokes and follows; drawn outlines overrule the model"),
 )

@@ -22,7 +22,7 @@ from functools import reduce
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .matte_grid import block_sums
+from .matte_grid import block_sums, box_around
 
 # The share of the exposure that has to be background.
 CLEAR = 1 / 16
@@ -74,11 +74,10 @@ def separated(colors: np.ndarray, matte: np.ndarray) -> tuple[np.ndarray, np.nda
     """
     own, behind = colors.copy(), colors.copy()
     mixed = (matte > 0) & (matte < 1)
-    if not mixed.any():
-        return own, behind
     height = len(matte)
     wide, near = max(round(height * WIDE), 2), max(round(height * NEAR), 1)
-    box = tuple(_around(mixed.any(axis=1 - axis), wide + near) for axis in (0, 1))
+    if (box := box_around(mixed, wide + near)) is None:
+        return own, behind
     # Planes of colours (C, h, w), which NumPy sums faster than pixels.
     picture, m = np.moveaxis(colors[box], -1, 0).copy(), matte[box].astype(np.float32)
     first, second = _nearer(picture, m, *_surroundings(picture, picture, m, wide, np.ogrid[: len(m), : m.shape[1]]))
@@ -100,16 +99,6 @@ def _nearer(picture: np.ndarray, matte: np.ndarray, own: np.ndarray, behind: np.
     """
     left = picture - matte * own - (1 - matte) * behind
     return own + matte * left, behind + (1 - matte) * left
-
-
-def _around(mixed: np.ndarray, reach: int) -> slice:
-    """Return the range of rows (or columns) from the first to the last mixed one, extended by `reach` at both ends.
-
-    Args:
-        mixed: Which of them have mixed pixels, bool (n,).
-    """
-    places = np.flatnonzero(mixed)
-    return slice(max(int(places[0]) - reach, 0), int(places[-1]) + reach + 1)
 
 
 def _surroundings(

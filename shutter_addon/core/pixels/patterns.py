@@ -17,9 +17,9 @@ def marks(index: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         index: The shutter's. The first one's pattern is plain, and patterns repeat after COUNT shutters.
         x, y: Places in units of the interface (pixels at 100 %), y up.
     """
-    across, up = _within(x, _PERIOD) < _WIDTH, _within(y, _PERIOD) < _WIDTH
-    rising, falling = _within(x - y + _OFF, _SLANTED) < _WIDTH, _within(x + y + _OFF, _SLANTED) < _WIDTH
-    apart = np.hypot(_within(x, _PERIOD) - _PERIOD / 2, _within(y, _PERIOD) - _PERIOD / 2)
+    across, up = x % _PERIOD < _WIDTH, y % _PERIOD < _WIDTH
+    rising, falling = (x - y + _OFF) % _SLANTED < _WIDTH, (x + y + _OFF) % _SLANTED < _WIDTH
+    apart = np.hypot(x % _PERIOD - _PERIOD / 2, y % _PERIOD - _PERIOD / 2)
     patterns = across & False, rising, apart < _RADIUS, falling, up, across, rising | falling, across | up
     return patterns[index % COUNT]
 
@@ -39,8 +39,3 @@ def painted(color: Sequence[float], index: int, x: np.ndarray, y: np.ndarray) ->
     """
     share = STRENGTH * marks(index, x, y)[..., None]
     return (1 - share) * np.asarray(color) + share * np.array(ink(color))
-
-
-def _within(place: np.ndarray, period: float) -> np.ndarray:
-    """Return how far places are beyond the last multiple of a period."""
-    return place - np.floor(place / period) * period

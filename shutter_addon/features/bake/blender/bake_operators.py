@@ -5,9 +5,7 @@ bake identity, which cuts and copies keep.
 """
 
 import uuid
-from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
 
 import bpy
 from bpy.app.translations import pgettext_data as data_
@@ -16,7 +14,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import EnumProperty
 from bpy.types import Context, MetaStrip, Operator, PropertyGroup, Scene, SequenceEditor, Strip, UILayout
 
-from ....blender.data import effect_version, fcurves, selection, strips
+from ....blender.data import effect_version, external_files, fcurves, selection, strips
 from ....blender.devices import main_thread
 from ....blender.editing import add_effect, match_source
 from ....blender.interface.operator_bases import Named, operator, redraw
@@ -212,7 +210,7 @@ def add_strip(scene: Scene, strip: Strip, film: baked_film.Film) -> Strip:
     home = strip.channel
     name, start = data_("{strip} Baked").format(strip=strip.name), round(strips.origin(strip)) + film.frames.start
     is_movie = film.kind == "MOVIE"
-    files = [_relative(path) for path in ([film.place] if is_movie else film.pictures)]
+    files = [external_files.relative(str(path)) for path in ([film.place] if is_movie else film.pictures)]
     baked = add_effect.new_footage(owner.strips, name, files, _channel(scene, strip), start, is_movie)
     baked.left_handle, baked.right_handle = strip.left_handle, strip.right_handle
     if any(home < each.channel < baked.channel and strips.overlap(each, strip) for each in owner.strips):
@@ -261,13 +259,6 @@ def _move(owner: SequenceEditor | MetaStrip, strip: Strip, channel: int) -> None
     """Move a strip to a channel, but only if there is room; otherwise Blender would shift it in time."""
     if _is_free(owner, strip, channel):
         strip.channel = channel
-
-
-def _relative(path: Path) -> str:
-    """Return a path relative to the .blend file if possible, so that both can be moved together."""
-    with suppress(ValueError):  # on another drive
-        return bpy.path.relpath(str(path))
-    return str(path)
 
 
 def baked_of(scene: Scene, strip: Strip) -> list:

@@ -119,7 +119,7 @@ def _check(scene: Scene, effect: PropertyGroup, strip: Strip, kind: Kind) -> Non
         raise EffectError(
             rpt_("movies are baked in Blender's own colours: with another configuration, bake to OpenEXR")
         )
-    with source_media.open_media(strips.source_of(scene, effect, strip)) as medium:
+    with source_media.spec(strips.source_of(scene, effect, strip)).open() as medium:
         if medium.alpha != "opaque":
             raise EffectError(rpt_("a movie has no transparency: bake to OpenEXR"))
         if medium.transfer == "linear":

@@ -18,6 +18,7 @@ from bpy.types import Context, Operator, PropertyGroup, Scene, Strip
 
 from ....blender.data import snapshot, source_media, strips, validation
 from ....blender.data.consistency import bars
+from ....blender.data.fcurves import Curves
 from ....blender.data.sampled import Sampling
 from ....blender.editing import bar_edits, shutter_edits
 from ....blender.interface.operator_bases import operator
@@ -89,7 +90,7 @@ def repair(scene: Scene, effect: PropertyGroup, strip: Strip, share: float, side
             changed.
     """
     frame = scene.frame_current
-    if (time := Sampling.of(scene, effect, strip, (frame,)).time) is not None:
+    if (time := Sampling(Curves(scene), effect, strip, (frame,)).time) is not None:
         backward = bool(time.at(frame)[1])
     else:
         backward = source_media.timing_of(strips.source_of(scene, effect, strip)).use_reverse_frames
@@ -164,7 +165,7 @@ def find_readout(self: Operator, _context: Context, effect: PropertyGroup) -> No
     scene, strip, columns = self.edit, self.effect_strip, self.reads == "COLUMNS"
     frame = scene.frame_current
     index = snapshot.source_frames(scene, effect, strip, (frame,))[frame]
-    with ShotSource(source_media.open_media(strips.source_of(scene, effect, strip))) as medium:
+    with ShotSource(source_media.spec(strips.source_of(scene, effect, strip)).open()) as medium:
         half = readout.FRAMES // 2
         low, high = max(index - half, 0), min(index + half, medium.count)
         shot = medium.around(index, low, high - 1)
