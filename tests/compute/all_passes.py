@@ -35,7 +35,7 @@ def _composing():
         yield composition(way, 3, **light(edges == 2), EDGES=edges)
     for way, tiled in itertools.product(_WAYS, (0, 1)):
         yield composition(way, 3, **light(not tiled), EDGES=2, SUMS=1, TILED=tiled)
-    for rows, groups, back, tiled in ((1, 1, False, True), (4, 2, True, False), (32, 4, True, True)):
+    for rows, groups, back, tiled in ((2, 1, False, 1), (4, 2, True, 0), (64, 4, True, 8)):
         yield _of_sums(rows, groups, back, tiled, light(back, encoded=True))
     for way, packed in itertools.product(_WAYS, (True, False)):
         for at in ((True, False), (False, True)):
@@ -46,7 +46,7 @@ def _composing():
 
 
 def _of_sums(rows, groups, back, tiled, light):
-    macros = {"ROWS": rows, "TABLE": (1 + rows) * (2 * groups + 1), "BACK": int(back), "TILED": int(tiled)}
+    macros = {"ROWS": rows, "TABLE": (1 + rows) * (groups + 1), "BACK": int(back), "TILED": tiled}
     return composition("sums", groups, **light, **macros)
 
 
