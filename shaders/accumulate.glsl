@@ -97,11 +97,12 @@ SUM sum;
 vec3 before;
 int made, position;  // how many were added; where the next one lies, in 1 / moment.y of two key moments
 
-// Adds the moments between the key moment before `key`, whose light is `before`, and this one.
+// Adds the moments from the key moment before `key`, whose light is `before`, to this one.
 void add_until(int key, vec3 light) {
   int steps = moment.y, start = (key - 1) * steps;
-  while (made < count && position < key * steps) {
-    vec3 color = mix(before, light, float(position - start) / float(steps));
+  while (made < count && position <= key * steps) {
+    float late = float(position - start) / float(steps);
+    vec3 color = before * (1.0 - late) + light * late;  // exactly, of key moments
 #  if DECODE == 0
     color = to_level(color);
 #  endif

@@ -1,7 +1,7 @@
-// Composes like compose_pieces.glsl, from running sums: a piece takes four look-ups, whatever its length.
-// table: 2 · GROUPS + 1 vectors of gains, then ROWS pieces, as in include/compose.glsl. Time 0 of the window lies `origin`
-// positions after the first sum. BACK: time runs backwards. Only whole frames are counted from the first sum: where sums
-// begin must not change a picture.
+// Composes like compose_pieces.glsl, from running sums: a knot takes two look-ups, whatever lies between it and the last.
+// table: GROUPS + 1 vectors of gains, then ROWS knots of the shutters' quantiles: times, and the exposure since the last
+// knot. Time 0 of the window lies `origin` positions after the first sum. BACK: time runs backwards. Only whole frames are
+// counted from the first sum: where sums begin must not change a picture.
 layout(local_size_x = 64, local_size_y = 2) in;
 layout(rgba32f) uniform readonly image2DArray coefficients;
 layout(STORED) uniform readonly uimage2DArray sums;
@@ -12,7 +12,7 @@ uniform float unit;
 #include "light.glsl"
 #include "finish.glsl"
 #include "sums.glsl"
-#define COLUMNS (2 * GROUPS + 1)
+#define COLUMNS (GROUPS + 1)
 
 // Pixels above one another that an invocation composes. On a software renderer, one and four are slower.
 #define PIXELS 2
@@ -21,9 +21,10 @@ uniform float unit;
 vec4 c[PIXELS * GROUPS];
 ivec3 place[PIXELS];  // where each pixel's sums are
 LIGHT total[PIXELS];
-vec4 starts[GROUPS];
-vec4 ends[GROUPS];
-float exposure;
+float last[PIXELS];  // the time of the last knot, the sum of the whole frames before it, and the light of the rest
+SUM last_sum[PIXELS];
+LIGHT last_rest[PIXELS];
+vec4 row[COLUMNS];  // of the table
 ivec2 corner;
 
 // Pixels beyond the picture's edge repeat the last one.
@@ -43,6 +44,9 @@ void start_pixel(int k) {
   }
   place[k] = place_of_sums(pixel_at(k));
   total[k] = LIGHT(0.0);
+  last[k] = 0.0;
+  last_sum[k] = SUM(0u);
+  last_rest[k] = LIGHT(0.0);
 }
 
 SUM sum_until(int k, int time) {
@@ -54,20 +58,24 @@ LIGHT light_between(SUM early, SUM late) {
   return unpacked_light(BACK != 0 ? minus(early, late) : minus(late, early));
 }
 
-void add_piece(int k) {
-  float start = 0.0;
-  float end = 0.0;
+float mixed(int k) {
+  float mean = 0.0;
   for (int g = 0; g < GROUPS; g++) {
-    start += dot(starts[g], c[k * GROUPS + g]);
-    end += dot(ends[g], c[k * GROUPS + g]);
+    mean += dot(row[g], c[k * GROUPS + g]);
   }
-  int first = int(start);
-  int last = int(end);
-  SUM early = sum_until(k, first);
-  SUM late = sum_until(k, last);
-  LIGHT light = light_between(early, late) + (end - float(last)) * light_between(late, sum_until(k, last + 1)) -
-               (start - float(first)) * light_between(early, sum_until(k, first + 1));
-  total[k] += light * (exposure / max(end - start, 1e-7));
+  return mean;
+}
+
+void move_to_knot(int k) {
+  float time = mixed(k);
+  int whole = int(time);
+  SUM sum = sum_until(k, whole);
+  LIGHT rest = (time - float(whole)) * light_between(sum, sum_until(k, whole + 1));
+  LIGHT light = light_between(last_sum[k], sum) + rest - last_rest[k];
+  total[k] += light * (row[GROUPS].x / max(time - last[k], 1e-7));
+  last[k] = time;
+  last_sum[k] = sum;
+  last_rest[k] = rest;
 }
 
 void finish_pixel(int k) {
@@ -76,11 +84,7 @@ void finish_pixel(int k) {
 #if ENCODED
   color.rgb = to_linear_exact(straight(color)) * color.a;
 #endif
-  float gain = 0.0;
-  for (int g = 0; g < GROUPS; g++) {
-    gain += dot(starts[g], c[k * GROUPS + g]);
-  }
-  color.rgb *= gain;
+  color.rgb *= mixed(k);
   finish(pixel + ivec2(0, top), color);
 }
 
@@ -90,16 +94,14 @@ void main() {
     return;
   }
   EACH(start_pixel);
-  for (int row = 1; row <= ROWS; row++) {
-    for (int g = 0; g < GROUPS; g++) {
-      starts[g] = table[row * COLUMNS + g];
-      ends[g] = table[row * COLUMNS + GROUPS + g];
+  for (int knot = 1; knot <= ROWS; knot++) {
+    for (int g = 0; g < COLUMNS; g++) {
+      row[g] = table[knot * COLUMNS + g];
     }
-    exposure = table[row * COLUMNS + 2 * GROUPS].x;
-    EACH(add_piece);
+    EACH(move_to_knot);
   }
   for (int g = 0; g < GROUPS; g++) {
-    starts[g] = table[g];  // the gains
+    row[g] = table[g];  // the gains
   }
   EACH(finish_pixel);
 }

@@ -57,10 +57,11 @@ vec4 covered(vec3 light) {
 }
 #endif
 
-// Where a pixel's sums begin. TILED: a row of texels holds a tile of 8 × 16 pixels, a layer holds a row of tiles.
+// Where a pixel's sums begin. TILED: a row of texels holds a tile of 8 × 16 pixels, a layer holds a row of tiles; each row
+// of a tile has so many layers side by side.
 ivec3 place_of_sums(ivec2 pixel) {
 #if TILED
-  return ivec3(((pixel.y & 15) << 3) + (pixel.x & 7), pixel.x >> 3, pixel.y >> 4);
+  return ivec3((pixel.y & 15) * 8 * TILED + (pixel.x & 7), pixel.x >> 3, pixel.y >> 4);
 #else
   return ivec3(pixel, 0);
 #endif
@@ -68,7 +69,7 @@ ivec3 place_of_sums(ivec2 pixel) {
 
 ivec3 place_in_layer(ivec3 place, int layer) {
 #if TILED
-  return place + ivec3(layer << 7, 0, 0);
+  return place + ivec3((layer & ~(TILED - 1)) * 128 + (layer & TILED - 1) * 8, 0, 0);
 #else
   return place + ivec3(0, 0, layer);
 #endif

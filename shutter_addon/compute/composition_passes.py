@@ -106,6 +106,20 @@ def filled_rows(rows: int) -> float:
     return next((filled for filled in _ROWS if filled >= rows), np.inf)
 
 
+def knots(values: np.ndarray) -> np.ndarray:
+    """Return the table of shaders/compose_sums.glsl for that of `table`.
+
+    Its knots are the ends of pieces, after each start that is not the end before.
+    """
+    groups = values.shape[1] // 2
+    rows = np.zeros((len(values), 2, groups + 1, 4), np.float32)
+    rows[:, 0, :groups], rows[:, 1] = values[:, :groups], values[:, groups:]
+    rows[0, 1] = rows[0, 0]  # the gains
+    chosen = np.ones((len(values), 2), bool)
+    chosen[0, 0], chosen[2:, 0] = False, (rows[2:, 0] != rows[1:-1, 1])[:, :groups].any(axis=(1, 2))
+    return rows[chosen]
+
+
 def padded(values: np.ndarray) -> np.ndarray:
     """Return values (…, N) of N shutters as texels (…, G, 4): four shutters to a texel, zeros after the last."""
     whole = np.pad(values, [(0, 0)] * (values.ndim - 1) + [(0, -values.shape[-1] % 4)])

@@ -23,6 +23,7 @@ from .composition_passes import (
     MODES,
     composition,
     filled_rows,
+    knots,
     lines_of,
     moved_tables,
     moved_way,
@@ -85,10 +86,10 @@ def _from_sums(window: Sums, request: Request, values: np.ndarray, origin: int) 
         values: The table of shutters, from composition_passes.table.
         origin: The position of the window's first frame (core.model.windows).
     """
-    groups, rows, back = values.shape[1] // 2, filled_rows(len(values) - 1), request.direction < 0
-    filled = np.zeros((1 + rows, *values.shape[1:]), np.float32)
-    filled[: len(values)] = values
-    macros = {"ROWS": rows, "TABLE": len(filled) * values.shape[1], "BACK": int(back), "TILED": int(window.tiled)}
+    back, rows = request.direction < 0, knots(values)
+    groups, count = rows.shape[1] - 1, 2 * int(filled_rows(len(rows) // 2))
+    filled = np.pad(rows, [(0, 1 + count - len(rows)), (0, 0), (0, 0)])
+    macros = {"ROWS": count, "TABLE": filled.size // 4, "BACK": int(back), "TILED": window.tiled}
     return composition("sums", groups, **_light(window, request), **macros), {
         "images": {},
         "blocks": {"table": filled.reshape(-1, 4)},
@@ -114,7 +115,7 @@ def _from_frames(
     options, (combine,) = state.options, state.groups
     if isinstance(window, Sums):
         lowest, edges = window.start, EDGES["shorten"] if shortened else 0
-        macros = {"SUMS": 1, "TILED": int(window.tiled)}
+        macros = {"SUMS": 1, "TILED": window.tiled}
     else:
         indices = windows.source_frames(options, origin + direction * np.arange(options.window), shot)
         lowest, edges, macros = int(indices[indices >= 0].min()), EDGES[options.edges], {}

@@ -26,7 +26,7 @@ _LISTED = 256  # tiles in a row of a list, as in shaders/accumulate.glsl
 STORED_SUMS = ("rgba16ui", "rgba32ui", "rgba32ui")
 
 
-def accumulation(decode: int, sent: str, back: bool, tiled: bool, cover: int = 0, kind: int = 1) -> Pass:
+def accumulation(decode: int, sent: str, back: bool, tiled: int, cover: int = 0, kind: int = 1) -> Pass:
     """Return the pass that makes a running sum from the one beside it, by adding or subtracting the frame in between.
 
     Args:
@@ -34,11 +34,11 @@ def accumulation(decode: int, sent: str, back: bool, tiled: bool, cover: int = 0
         sent: How the frame was sent: "COLOURS", "NUMBERS" (Device.send), "PLANES" or "MOMENT". "AGAIN": it is the
             difference of two sums that are there already.
         back: Whether it is subtracted.
-        tiled: Whether sums are stored in tiles.
+        tiled: As of Sums.
         cover: Which weights frames have: 0 none, 1 those of a layer, 2 those of the background behind layers.
         kind: MOMENT of the shader, for moments.
     """
-    macros = {"DECODE": decode, "BACK": int(back), "TILED": int(tiled), "COVER": cover, sent: kind}
+    macros = {"DECODE": decode, "BACK": int(back), "TILED": tiled, "COVER": cover, sent: kind}
     return read_pass("accumulate", STORED=STORED_SUMS[cover], **macros)
 
 
@@ -87,7 +87,7 @@ class Sums(Window):
     Attributes:
         start, stop: The positions of the first and the last sum.
         whole: The value of white in a field, in the light that is summed (Options.light).
-        tiled: Whether pixels are stored tile by tile, in TILE.
+        tiled: TILED of shaders/include/sums.glsl; 0: pixels are not stored tile by tile, in TILE.
     """
 
     def __init__(self, device: Device, source: FrameSource, capacity: int, shutters: int = 1) -> None:
@@ -103,7 +103,9 @@ class Sums(Window):
         # A workgroup reads all layers of its pixels. In tiles, they are one run of memory.
         across, down = TILE
         fits = across * down * self.layers <= device.max_size and -(-source.height // down) <= device.max_layers
-        self.tiled = llvmpipe.is_llvmpipe(device.name) and fits
+        # Moments are made together, and lie together.
+        self.tiled = (8 if source.step > 1 else 1) if llvmpipe.is_llvmpipe(device.name) and fits else 0
+        self.layers += -self.layers % max(self.tiled, 1)
         super().__init__(device, source, capacity, shutters)
 
     @property
@@ -127,7 +129,7 @@ class Sums(Window):
             self._light, self._frames = options.light, {}
             self.start = self.stop = first
         while self.stop < last:
-            next_ = self._together(frames[self.stop - first :])
+            next_ = self._together(frames[self.stop - first :], decoding(self.source.transfer, options.light))
             self._keep(max(self.start, self.stop + len(next_) - self.capacity), self.stop)
             self.stop += self._add(options.light, next_, self.stop, self.stop + 1)
         while self.start > first:
@@ -154,10 +156,13 @@ class Sums(Window):
         self.start, self.stop = start, stop
         self._frames = {position: frame for position, frame in self._frames.items() if start <= position < stop}
 
-    def _together(self, frames: list[int]) -> list[int]:
-        """Return those of the next source frames that one pass may add: one, or successive moments of a pair."""
+    def _together(self, frames: list[int], decode: int) -> list[int]:
+        """Return those of the next source frames that one pass may add: moments of a pair, one after another.
+
+        The second frame of the pair may follow, if the pass decodes it as others do.
+        """
         step, first = self.source.step, frames[0]
-        pair = range(first, first - first % step + step)
+        pair = range(first, first - first % step + step + (decode == 1))
         if self.cover or first % step == 0 or any(frame in pair for frame in self.held):
             return frames[:1]
         return [frame for frame, wanted in zip(frames, pair, strict=False) if frame == wanted]
@@ -177,23 +182,20 @@ class Sums(Window):
         frame = frames[0]
         # A position that shows this frame already: it need not be read.
         same = next((position for position, held in self._frames.items() if held == frame), None)
-        images: dict[str, Texture] = {}
         given: Given = {"known": known % self.layers, "next": next_ % self.layers}
         if same is None:
             sent, arguments = self._send(frames)
             given |= arguments | {"whole": float(self.whole)}
-            images = given.pop("images", images)
         else:
             sent = "AGAIN"
             given |= {"before": same % self.layers, "after": (same + 1) % self.layers}
-        decode, moment = decoding(self.source.transfer, light), given.pop("of", None)
+        decode, images, moment = decoding(self.source.transfer, light), given.pop("images", {}), given.pop("of", None)
         for part, sums in self.stored():
             size = self.source.width, part.height
             runs = [(1, size, given)] if moment is None else _by_level(moment, part, given)
             for kind, extent, arguments in runs:
                 program = accumulation(decode, sent, next_ < known, self.tiled, self.cover, kind)
-                bound = images | {"sums": sums}
-                self.device.run(program, extent, images=bound, size=size, top=part.top, **arguments)
+                self.device.run(program, extent, images=images | {"sums": sums}, size=size, top=part.top, **arguments)
         frames = frames[: given.get("count", 1)]
         self._frames |= dict(enumerate(frames, min(known, next_)))
         kept()
@@ -216,7 +218,7 @@ class Sums(Window):
         if isinstance(frame, Planes) and self.device.takes_planes:
             return "PLANES", self._send_planes(frame)
         if isinstance(frame, Moment):
-            return "MOMENT", self._send_moments([frame, *self._evenly(frame, frames[1:])])
+            return "MOMENT", self._send_moments(frame, len(frames))
         own = self._own("frame", "rgba8")
         sent = self.device.send(own, as_rgba(frame))
         return "COLOURS" if sent is own else "NUMBERS", {"textures": {"frame": sent}}
@@ -235,9 +237,13 @@ class Sums(Window):
             "blue_of": matrix.blue_of_cb,
         }
 
-    def _send_moments(self, moments: list[Moment]) -> Given:
-        """Send what moments of one pair are made from, and return the arguments of the pass that adds them."""
-        first = moments[0]
+    def _send_moments(self, first: Moment, count: int) -> Given:
+        """Send what moments of one pair are made from, and return the arguments of the pass that adds them.
+
+        Args:
+            first: The first moment to add.
+            count: How many are added.
+        """
         layers, height, width, _ = first.vectors.shape
         vectors = self._extra.of("vectors", (width, height, layers), "rgba16")
         rows = -(-first.levels.size // _LISTED)
@@ -257,17 +263,9 @@ class Sums(Window):
             "textures": {"tiles": tiles},
             "images": {"filmed": filmed, "vectors": vectors},
             "moment": (first.number, first.steps, layers + 1, start),
-            "count": len(moments),
+            "count": count,
             "layers": self.layers,
         }
-
-    def _evenly(self, moment: Moment, indices: list[int]) -> Iterator[Moment]:
-        """Yield those of the next source frames that are moments of the same pair, one step apart each."""
-        for number, index in enumerate(indices, moment.number + 1):
-            frame = self.source.decoded(index)
-            if not isinstance(frame, Moment) or (frame.pair, frame.number) != (moment.pair, number):
-                break
-            yield frame
 
     def _filmed(self, moment: Moment) -> tuple[Texture, int]:
         """Return the two filmed frames that a moment is made from, on the device, and the layer of the first.

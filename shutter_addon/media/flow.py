@@ -30,7 +30,7 @@ UNLIKE, GREY, NOISE = 24.0, 90.0, 4.0
 SHARED = 0.5  # the share of vectors, in each direction, that have to be good
 # Where nothing moves farther than STILL between two frames, in 1 / UNIT of a pixel, moments are mixes of both frames.
 # Up to MOVES, one key moment lies between them; each doubling of the distance doubles the key moments.
-STILL, MOVES = UNIT // 8, 2 * UNIT
+STILL, MOVES = UNIT // 4, 2 * UNIT
 _KEPT = 4  # cached key moments, and cached sets of vectors
 VERSION = 2  # raise it when `found` gives something else of the same pictures
 

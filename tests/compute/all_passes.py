@@ -35,7 +35,7 @@ def _composing():
         yield composition(way, 3, **light(edges == 2), EDGES=edges)
     for way, tiled in itertools.product(_WAYS, (0, 1)):
         yield composition(way, 3, **light(not tiled), EDGES=2, SUMS=1, TILED=tiled)
-    for rows, groups, back, tiled in ((1, 1, False, True), (4, 2, True, False), (32, 4, True, True)):
+    for rows, groups, back, tiled in ((2, 1, False, 1), (4, 2, True, 0), (64, 4, True, 8)):
         yield _of_sums(rows, groups, back, tiled, light(back, encoded=True))
     for way, packed in itertools.product(_WAYS, (True, False)):
         for at in ((True, False), (False, True)):
@@ -46,7 +46,7 @@ def _composing():
 
 
 def _of_sums(rows, groups, back, tiled, light):
-    macros = {"ROWS": rows, "TABLE": (1 + rows) * (2 * groups + 1), "BACK": int(back), "TILED": int(tiled)}
+    macros = {"ROWS": rows, "TABLE": (1 + rows) * (groups + 1), "BACK": int(back), "TILED": tiled}
     return composition("sums", groups, **light, **macros)
 
 
@@ -83,7 +83,7 @@ def _layers():
             yield composition(way, 3, **light, EDGES=2, SUMS=1, TILED=tiled)
         for sent in ("COLOURS", "PLANES", "MOMENT", "AGAIN"):
             for kind in (1, 2, 3) if sent == "MOMENT" else (1,):
-                yield running_sums.accumulation(1, sent, cover == 1, cover == 2, cover, kind)
+                yield running_sums.accumulation(1, sent, cover == 1, tiled, cover, kind)
     for ends, opaque in itertools.product((True, False), repeat=2):
         macros = {"ENDS": int(ends), "OPAQUE": int(opaque)}
         yield read_pass("layer", BEGINS=1, PLAIN=int(not opaque), PLATE=int(ends), LEVELS=int(ends), **macros)
@@ -91,8 +91,8 @@ def _layers():
 
 
 def _filling():
-    for tiled, sent in itertools.product((True, False), ("COLOURS", "NUMBERS", "PLANES", "MOMENT", "AGAIN")):
-        yield running_sums.accumulation(1, sent, tiled, tiled)
+    for tiled, sent in itertools.product((8, 0), ("COLOURS", "NUMBERS", "PLANES", "MOMENT", "AGAIN")):
+        yield running_sums.accumulation(1, sent, bool(tiled), tiled)
     yield read_pass("pack", DECODE=1, SQUARED=1)
     yield read_pass("pack", DECODE=2, SQUARED=0)
     yield read_pass("matte_blend", COUNT=2, MOST=stages.MOST_MATTES)
