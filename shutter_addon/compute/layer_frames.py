@@ -177,19 +177,19 @@ class LayerMattes:
 
     def _of_content(self, matte: Matte, frame: int) -> np.ndarray:
         """Return a matte's values (H, W) float32. A file's frames move with the picture at moments between them."""
-        reader, content = self._reader, matte.content
+        reader, content, source = self._reader, matte.content, self._source
         assert reader is not None
         key = content, matte.feather, matte.invert, frame if isinstance(content, FileFrame) else None
-        moves = isinstance(content, FileFrame) and content.time is None and self._source.step > 1
-        moment = self._source.decoded(frame) if moves else None
-        if not isinstance(moment, Moment):
-            return _fraction(self._get(key, lambda: reader.values((matte,), frame, 1)[0][1]))
+        moves = isinstance(content, FileFrame) and content.time is None and (frame % source.step or source.repeats)
 
-        def moved() -> np.ndarray:
-            ends = [self._of_content(matte, number * self._source.step) for number in moment.pair]
-            return moment.between.values(moment, *ends)
+        def values() -> np.ndarray:
+            moment = source.decoded(frame) if moves else None
+            if not isinstance(moment, Moment):
+                return reader.values((matte,), frame, 1)[0][1]
+            first, second = (self._of_content(matte, number * source.step) for number in moment.pair)
+            return first if np.array_equal(first, second) else moment.between.values(moment, first, second)
 
-        return _fraction(self._get(key, moved))
+        return _fraction(self._get(key, values))
 
     def behind(self, layers: Layers, frame: int) -> np.ndarray:
         """Return how much of the background a source frame shows behind all layers, (H, W) float32, 0 … 1."""

@@ -172,7 +172,7 @@ class Sums(Window):
 
         Args:
             light: What is summed (Options.light).
-            frames: That frame, and the next ones, which are added as well if they are moments.
+            frames: That frame, and the next ones that the same pass may add (`_together`).
             known: The position of the sum beside it.
             next_: The position.
 
@@ -209,7 +209,7 @@ class Sums(Window):
         return across * down * self.layers, -(-self.source.width // across), -(-part.height // down)
 
     def _send(self, frames: list[int]) -> tuple[str, Given]:
-        """Send a source frame to the device, and the next ones if they are moments of the same pair.
+        """Send a source frame to the device, or what it and the next moments of its pair are made from.
 
         Returns:
             How it was sent (`accumulation`), and the arguments of the pass that adds it.
@@ -218,6 +218,8 @@ class Sums(Window):
         if isinstance(frame, Planes) and self.device.takes_planes:
             return "PLANES", self._send_planes(frame)
         if isinstance(frame, Moment):
+            if frames[-1] % self.source.step == 0:
+                self.source.decoded(frames[-1])  # as guides note it, and what was decoded ahead is taken
             return "MOMENT", self._send_moments(frame, len(frames))
         own = self._own("frame", "rgba8")
         sent = self.device.send(own, as_rgba(frame))

@@ -109,6 +109,7 @@ class Between:
 
     def values(self, moment: Moment, first: np.ndarray, second: np.ndarray) -> np.ndarray:
         """Return values (H, W) at a moment, given those of both frames, float32, which move like the frames."""
+        stopping.check()
         (height, width), keys = first.shape, len(moment.vectors) + 1
         key = min(max(round(moment.number * keys / moment.steps), 1), keys - 1)
         flags, scale = (

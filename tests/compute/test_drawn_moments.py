@@ -13,7 +13,9 @@ from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import shutters
 from shutter_addon.core.model.frame_state import FrameState, Options
+from shutter_addon.core.model.scribbles import Shape
 from shutter_addon.features.smooth.smooth import SmoothSource
+from shutter_addon.media.cuts import ShotSource
 from shutter_addon.media.matte_values import MatteValues
 
 STEPS = 4
@@ -65,7 +67,7 @@ def test_a_moment_alone(device, size, steps):
 
 
 def test_a_layers_matte_moves_with_its_subject(device):
-    """At moments, as it does from filmed frame to filmed frame."""
+    """At moments. One that stands still stays, and filmed frames need no footage."""
     height, width = 96, 160
     far, near = np.random.default_rng(4).random((2, 16, 40, 1)).repeat(6, 1).repeat(6, 2)
     x, y = np.meshgrid(np.arange(width), np.arange(height))
@@ -77,11 +79,15 @@ def test_a_layers_matte_moves_with_its_subject(device):
     moved = np.stack([np.roll(near, 8 * k, axis=1) for k in range(3)])[:, :, :width]
     mixed = far[:, :width] + discs[..., None] * (moved - far[:, :width])
     frames = np.concatenate([mixed, mixed, mixed, np.ones_like(mixed)], axis=3) * 255
-    source = SmoothSource(Footage(np.rint(frames).astype(np.uint8)), 4)
-    renderer = Renderer(device, source, MatteValues(width, height, 4))
+    filmed = Footage(np.rint(frames).astype(np.uint8))
+    renderer = Renderer(device, SmoothSource(filmed, 4), MatteValues(width, height, 4))
+    moving, still = (with_layers(ALONE, mattes)[0] for mattes in (discs, discs[[0, 0, 0]]))
+    renderer.layer_mattes(Request(4, moving))
+    assert filmed.reads == []
     for index in (6, 7):
-        (found,) = renderer.layer_mattes(Request(index, with_layers(ALONE, discs)[0]))
+        (found,) = renderer.layer_mattes(Request(index, moving))
         assert np.abs(found - matte(index / 4)).sum() < 0.5 * np.abs(matte(1) - matte(index / 4)).sum()
+        np.testing.assert_allclose(renderer.layer_mattes(Request(index, still))[0], discs[0], atol=1e-4)
 
 
 def repeating(steps):
@@ -127,3 +133,20 @@ def test_filmed_frames_of_a_pair_are_sent_once(gpu_device, monkeypatch):
     moment = smooth(FrameState(Options(4), np.ones((1, 4))), 8)
     Renderer(GPUCompositor(gpu_device), source).picture(Request(0, moment))
     assert sent == [0, 1, 2, 3]
+
+
+def test_filmed_frames_are_not_read_again_to_guide(gpu_device):
+    """Those that a pass adds with the moments before them are the diffusion's, too."""
+    from shutter_addon.compute.gpu import GPUCompositor
+
+    filmed = film(np.random.default_rng(8))
+    filmed.frames = np.stack([np.roll(filmed.frames[0], k, axis=1) for k in range(30)])
+    filmed.count = 30
+    source = ShotSource(SmoothSource(filmed, 4), 4)
+    line = Shape(1, "line", 0.1, (np.array([[0.1, 0.2], [0.7, 0.3]]),))
+    options = Options(16, position="center", edge_aware=1.0, border=True, stop_at_cuts=False)
+    moment = smooth(FrameState(options, np.ones((2, 16)), (line,)))
+    renderer = Renderer(GPUCompositor(gpu_device), source)
+    for index in range(10, 18):
+        renderer.picture(Request(4 * index, moment))
+    assert len(filmed.reads) == len(set(filmed.reads))
