@@ -201,5 +201,9 @@ def unregister() -> None:
         getattr(bpy.app.handlers, name).remove(function)
     if isinstance(ours := sys.excepthook, partial) and ours.func is _uncaught:  # not one that was installed later
         sys.excepthook = ours.args[0]
-    _forget_file()
+    operator_bases.end_all()
+    edit_feed.end()
+    sessions.forget()
+    source_media.look_again()
+    reconciling.forget()
     undelete.forget()
