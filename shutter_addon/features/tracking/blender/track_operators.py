@@ -265,8 +265,10 @@ def draw_tracking(layout: UILayout, index: int | None, is_subject: bool = False)
     row = layout.row(align=True)
     track = "shutter.track_camera" if index is None else "shutter.track"
     for direction, _name, _description, icon, _number in DIRECTIONS:
-        text = ("Track Camera" if index is None else "Track") if direction == "BOTH" else ""
-        row.operator(track, text=text, icon=icon).direction = direction
+        button = row.operator(
+            track, text=("Track Camera" if index is None else "Track") if direction == "BOTH" else "", icon=icon
+        )
+        button.direction = direction
     row.operator("shutter.outline_needed" if is_subject else f"{track}_look", text="", icon="VIEWZOOM")
 
 
