@@ -54,7 +54,6 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
         context = sessions.of_engine(self._say)
         try:
             with stopping.once(stopped or self._stopped):
-                stopping.check()
                 picture = pictures.picture(context, shown, frame, detail)
         except StoppedError:
             if asked is None or stopped is None:

@@ -14,6 +14,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ...compute.devices.device import MEGABYTE
 from ...compute.renderer import Renderer
 from ...compute.request import Request
+from ...core import stopping
 from ...core.pixels.matte_grid import block_means
 from ...media import color
 from ...media.image_writing import write_exr
@@ -38,6 +39,7 @@ def picture(context: RenderContext, snapshot: Snapshot, frame: float, detail: De
         effect_source.FAULTS: The picture cannot be made.
         StoppedError: It is no longer wanted.
     """
+    stopping.check()
     session, request = context.session, context.request(snapshot, frame, detail)
     renderer = context.renderer(request)  # opened again, if the window has closed it meanwhile
     if (weights := render_job.job.weights) is not None:

@@ -144,7 +144,6 @@ def render(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film, report
     with film_output.stoppable() as stopped, stopping.once(lambda: bool(stopped)):
 
         def picture(frame: int) -> np.ndarray:
-            stopping.check()
             context = sessions.of_render(levels=film.kind == "MOVIE")
             made = pictures.picture(context, taken, start + frame)
             context.session.begin_next(taken, start + frame, context)
