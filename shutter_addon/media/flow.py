@@ -112,17 +112,12 @@ class Between:
         stopping.check()
         (height, width), keys = first.shape, len(moment.vectors) + 1
         key = min(max(round(moment.number * keys / moment.steps), 1), keys - 1)
-        flags, scale = (
-            cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
-            np.array([[1 / STEP, 0, 0], [0, 1 / STEP, 0]], np.float32),
-        )
-        vectors = moment.vectors[key - 1].astype(np.float32)
-        spread = cv2.warpAffine(vectors, scale, (width, height), flags=flags, borderMode=cv2.BORDER_REPLICATE)
-        share, paths = key / keys, (spread[..., :2] - ZERO) / np.float32(UNIT)
-        places = grid(height, width) - np.float32(share) * paths
+        vectors, scale = moment.vectors[key - 1].astype(np.float32), np.array([[STEP, 0, 0], [0, STEP, 0]], np.float32)
+        spread = cv2.warpAffine(vectors, scale, (width, height), borderMode=cv2.BORDER_REPLICATE)
+        paths = (spread[..., :2] - ZERO) / np.float32(UNIT)
+        places = grid(height, width) - np.float32(key / keys) * paths
         before, after = look(first, places), look(second, places + paths)
-        late, early = share * (spread[..., 3] + 13), (1 - share) * (spread[..., 2] + 13)  # as _mixed weighs them
-        return before + late / (late + early) * (after - before)
+        return before + _late(spread[..., 2:] / np.float32(255), key, keys) * (after - before)
 
     def _light(self, vectors: np.ndarray, key: int) -> np.ndarray:
         """Return the linear light of a key moment, (H, W, 3 or 4) float32.
@@ -390,13 +385,23 @@ def _mixed(ends: list[np.ndarray], vectors: np.ndarray, key: int, keys: int) -> 
     half = 1 << (shift - 1)
     first = _cubic(ends[0], here - ((key * paths + half) >> shift))
     second = _cubic(ends[1], here + (((keys - key) * paths + half) >> shift))
-    shown = spread[..., 2:] * np.float32(1 / (255 * STEP**2)) + np.float32(0.05)
-    late: np.ndarray = np.float32(key) * shown[..., 1]
-    late = (late / (late + np.float32(keys - key) * shown[..., 0]))[..., None]
+    late = _late(spread[..., 2:] * np.float32(1 / (255 * STEP**2)), key, keys)[..., None]
     mixed = first + late * (second.astype(np.float32) - first)
     if first.dtype == np.uint8:
         mixed *= np.float32(257)  # white of 16 bits over white of 8
     return np.rint(mixed).astype(np.uint16) if first.dtype.kind == "u" else mixed
+
+
+def _late(sure: np.ndarray, key: int, keys: int) -> np.ndarray:
+    """Return the weight (H, W) of the second frame at a key moment.
+
+    Args:
+        sure: How surely the first and the second frame show what follows the path, (H, W, 2), 0 to 1.
+        key, keys: As in `_mixed`.
+    """
+    shown = sure + np.float32(0.05)
+    late: np.ndarray = np.float32(key) * shown[..., 1]
+    return late / (late + np.float32(keys - key) * shown[..., 0])
 
 
 def _spread(values: np.ndarray, height: int, width: int) -> np.ndarray:
