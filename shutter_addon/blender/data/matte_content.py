@@ -165,7 +165,7 @@ def _of_strip(strip: Strip, word: str) -> MatteFile:
 
 def strip_name(region: PropertyGroup) -> str:
     """Return the name of the strip that is a region's matte, the first of several; "": there is none."""
-    return next((strip.name for strip in strips.identified(region.id_data, "virtual_shutter_matte", region.strip)), "")
+    return next((strip.name for strip in _with_identity(region)), "")
 
 
 def choose_strip(region: PropertyGroup, name: str) -> None:
@@ -194,7 +194,7 @@ def strips_of(region: PropertyGroup) -> list:
     Raises:
         EffectError: There are none.
     """
-    matching = strips.identified(region.id_data, "virtual_shutter_matte", region.strip)
+    matching = _with_identity(region)
     if not matching:
         words = rpt_("{place}: its matte strip was deleted") if region.strip else rpt_("{place}: it has no matte strip")
         raise EffectError(words.format(place=validation.place(region)))
@@ -221,3 +221,8 @@ def parts_for(region: PropertyGroup, effect_strip: Strip) -> list:
 def part_at(parts: list, frame: float) -> Strip:
     """Return the strip that lies at a timeline frame, the first listed of several; if there is none, the nearest."""
     return min(parts, key=lambda part: max(part.left_handle - frame, frame - part.right_handle + 1, 0))
+
+
+def _with_identity(region: PropertyGroup) -> list:
+    """Return the strips that a region's matte is read from, by identity."""
+    return strips.identified(region.id_data, "virtual_shutter_matte", region.strip)

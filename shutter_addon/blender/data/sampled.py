@@ -10,7 +10,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from bpy.types import PropertyGroup, Strip
+from bpy.types import PropertyGroup, Scene, Strip
 
 from ...core.messages import UserError
 from ...core.model import effect as model
@@ -76,6 +76,10 @@ class Sampling:
     effect: PropertyGroup
     strip: Strip | None
     frames: Frames
+
+    @staticmethod
+    def of(scene: Scene, effect: PropertyGroup, strip: Strip | None, frames: Frames) -> "Sampling":
+        return Sampling(Curves(scene), effect, strip, frames)
 
     @cached_property
     def path(self) -> str:

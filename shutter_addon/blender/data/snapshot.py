@@ -25,7 +25,7 @@ from ...core.model.frame_state import Options
 from ...core.recipes import key_fitting
 from . import matte_content, preferences, sampled, source_media, strips, validation
 from .annotations import LAYERS, image_to_picture, layer_of, layers_of, picture_size
-from .fcurves import Curves, curves_under, points_of, progress, stretched
+from .fcurves import curves_under, points_of, progress, stretched
 from .sampled import Frames, Sampling
 
 
@@ -99,7 +99,7 @@ def read(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames) -> m
     layers = any(region.is_layer for region in effect.regions)
     # With layers, motions count for every region, at all frames around.
     followed = {s.follow_region for s in effect.shutters if s.follow == "REGION"}
-    narrow = Sampling(Curves(scene), effect, strip, frames)
+    narrow = Sampling.of(scene, effect, strip, frames)
     wide = replace(narrow, frames=_around(effect, frames, layers))
     names = [shutter.name for shutter in effect.shutters]
     regions = tuple(
@@ -165,7 +165,7 @@ def bars_at(scene: Scene, effect: PropertyGroup, index: int, frame: float) -> np
     Raises:
         EffectError: A bar is out of range, or they are not as many as the window is long.
     """
-    sampling = Sampling(Curves(scene), effect, None, (frame,))
+    sampling = Sampling.of(scene, effect, None, (frame,))
     options = _options(sampling)
     return _shutter(sampling, index, options).bars.at(frame, options.at(frame).interpolation)
 
@@ -200,7 +200,7 @@ def region_at(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, fra
         A Region, or for a matte or ramp a MatteRegion.
     """
     read_region = _region if effect.regions[index].kind in strips.OUTLINED else _any_region
-    return read_region(Sampling(Curves(scene), effect, strip, frames), index, 0)
+    return read_region(Sampling.of(scene, effect, strip, frames), index, 0)
 
 
 def carried_outline(
@@ -218,7 +218,7 @@ def carried_outline(
     Raises:
         EffectError, MediaError: The outline is interpolated instead of tracked, or has no source.
     """
-    sampling = Sampling(Curves(scene), effect, strip, frames)
+    sampling = Sampling.of(scene, effect, strip, frames)
     _curves, file = _drawn(sampling, index)
     if file is None:
         place = validation.place(effect.regions[index])
@@ -232,12 +232,12 @@ def source_frames(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Fra
     Raises:
         EffectError, MediaError: The effect has no source strip, or its movie cannot be read.
     """
-    return matte_content.filmed_frames(Sampling(Curves(scene), effect, strip, frames))
+    return matte_content.filmed_frames(Sampling.of(scene, effect, strip, frames))
 
 
 def camera_at(scene: Scene, effect: PropertyGroup, frames: Frames) -> model.Camera:
     """Return the effect's camera motion as plain data, sampled at timeline frames."""
-    return _camera(Sampling(Curves(scene), effect, None, frames))
+    return _camera(Sampling.of(scene, effect, None, frames))
 
 
 def check_counts(effect: PropertyGroup) -> None:

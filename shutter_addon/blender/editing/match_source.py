@@ -163,7 +163,7 @@ def places(effect: PropertyGroup, strip: Strip) -> list[np.ndarray | None]:
     None in place of a matrix: the picture is too small there, or its transform is not finite.
     """
     frames = [drawing.frame_number for drawing in _drawings(effect)]
-    placement = sampled.Sampling(fcurves.Curves(effect.id_data), effect, strip, frames).placement
+    placement = sampled.Sampling.of(effect.id_data, effect, strip, frames).placement
     found = [sampled.tried(placement.at, frame) for frame in frames]
     return [place if isinstance(place, np.ndarray) else None for place in found]
 

@@ -164,7 +164,7 @@ def hold_drawings(effect: PropertyGroup, index: int) -> None:
     """
     region = effect.regions[index]
     if region.kind not in strips.LAID:
-        _note(effect, region, _origins(Sampling(fcurves.Curves(effect.id_data), effect, None, ()).drawings(index)))
+        _note(effect, region, _origins(Sampling.of(effect.id_data, effect, None, ()).drawings(index)))
 
 
 def begin_drawing(effect: PropertyGroup, strip: Strip, index: int, *, erases: bool = False) -> None:

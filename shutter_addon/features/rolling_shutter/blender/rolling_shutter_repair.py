@@ -18,7 +18,6 @@ from bpy.types import Context, Operator, PropertyGroup, Scene, Strip
 
 from ....blender.data import snapshot, source_media, strips, validation
 from ....blender.data.consistency import bars
-from ....blender.data.fcurves import Curves
 from ....blender.data.sampled import Sampling
 from ....blender.editing import bar_edits, shutter_edits
 from ....blender.interface.operator_bases import operator
@@ -90,7 +89,7 @@ def repair(scene: Scene, effect: PropertyGroup, strip: Strip, share: float, side
             changed.
     """
     frame = scene.frame_current
-    if (time := Sampling(Curves(scene), effect, strip, (frame,)).time) is not None:
+    if (time := Sampling.of(scene, effect, strip, (frame,)).time) is not None:
         backward = bool(time.at(frame)[1])
     else:
         backward = source_media.timing_of(strips.source_of(scene, effect, strip)).use_reverse_frames
