@@ -33,7 +33,7 @@ def writing(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def part_folder(parent: Path) -> Iterator[Path]:
-    """Yield a new part folder in `parent`, and remove it with its content at the end.
+    """Yield a new part folder (a temporary folder) in `parent`, and remove it with its content at the end.
 
     Libraries write files by path. In a new folder, nobody can have placed a link, and no other process writes.
 
@@ -48,7 +48,7 @@ def part_folder(parent: Path) -> Iterator[Path]:
 
 
 def new_part(parent: Path) -> Path:
-    """Make a part folder in `parent` and return its path.
+    """Make a part folder (a temporary folder) in `parent` and return its path.
 
     Raises:
         OSError: It cannot be made.
@@ -60,12 +60,12 @@ def new_part(parent: Path) -> Path:
 
 
 def is_part(name: str) -> bool:
-    """Return whether a folder's name is that of a part folder."""
+    """Return whether a folder's name is that of a part folder, a temporary folder of this module."""
     return _NAME.fullmatch(name) is not None
 
 
 def clear_up(parent: Path) -> None:
-    """Remove part folders in `parent` that killed processes have left: those unchanged for LEFT_BEHIND seconds."""
+    """Remove temporary folders in `parent` that killed processes have left: those unchanged for LEFT_BEHIND seconds."""
     with suppress(OSError):
         parts = [parent / name for name in os.listdir(parent) if is_part(name)]
         if parts:
@@ -79,7 +79,7 @@ def clear_up(parent: Path) -> None:
 def _last_written(folder: Path) -> float:
     """Return when a folder or a file in it last changed, in seconds since 1970.
 
-    It is infinity if that is unknown, so that the folder is never removed.
+    Return infinity if the time is unknown, so that `clear_up` never removes the folder.
     """
     try:
         times = [entry.stat(follow_symlinks=False).st_mtime for entry in os.scandir(folder)]

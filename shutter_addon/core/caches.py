@@ -12,7 +12,7 @@ T = TypeVar("T")
 
 
 class LastValue(Generic[T]):
-    """A cache of one value. It is made again when its key changes.
+    """A cache of one value, which is made again when it is asked for with another key.
 
     Attributes:
         made: How many values have been made, which tells apart values with equal keys.
@@ -47,7 +47,7 @@ class LastValue(Generic[T]):
 
 
 class RecentValues(dict[K, T]):
-    """A cache of the values that were used last, by key. As a dict, it has the least recently used one first."""
+    """A cache of the values that were used last: a dict by key, with the least recently used value first."""
 
     def ask(self, key: K, make: Callable[[], T], most: int) -> T:
         """Return the cached value of a key, or make it. At most `most` values are cached from then on."""

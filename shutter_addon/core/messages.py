@@ -41,7 +41,9 @@ class MediaError(UserError):
 
 @contextmanager
 def translated(translate: Callable[[str], str]) -> Iterator[None]:
-    """Raise EffectErrors of this context again in the user's language.
+    """Catch an EffectError in the `with` block, and raise it with its message in the user's language.
+
+    An error without values for placeholders is raised as it is.
 
     Args:
         translate: Translates the template of an error, and its placeholder "fault".
@@ -72,12 +74,12 @@ def sentence(text: object, longest: int = LONGEST) -> str:
 
 
 def of_file(error: Exception, place: str | os.PathLike[str] = "") -> str:
-    """Return an error's message. An OSError's begins with its file, or `place` if it names none."""
+    """Return an error's message. For an OSError, it begins with the file's path, or with `place` if that is unknown."""
     if isinstance(error, OSError):
         return f"{os.fsdecode(error.filename or place)}: {error.strerror or error}"
     return str(error)
 
 
 def signed(text: object) -> str:
-    """Return the sentence after "Virtual Shutter: ", for output among Blender's own."""
+    """Return the text as one sentence with "Virtual Shutter: " before it, for output among Blender's messages."""
     return sentence(f"Virtual Shutter: {text}")

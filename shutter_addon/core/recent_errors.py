@@ -18,7 +18,7 @@ _lines: list[tuple[str, float]] = []  # with seconds since the start, replaced a
 
 
 def record(level: int = 1) -> None:
-    """Keep the line of code that makes an error or reports a message.
+    """Keep the line of code that makes an error or reports a message, if it is in the extension, for reports.
 
     Args:
         level: How many calls up that line is: 1 for the caller.
@@ -40,12 +40,12 @@ def exception(error: BaseException) -> None:
 
 
 def last() -> list[str]:
-    """Return the kept lines, each with the seconds since the extension's start, the oldest first."""
+    """Return the kept lines of code and errors, each with the seconds since the extension's start, the oldest first."""
     return [f"{seconds:.0f} s: {words}" for words, seconds in _lines]
 
 
 def _keep(words: str) -> None:
-    """Keep a line with the time, as the newest, and forget the same line from before."""
+    """Keep a line with the current time. Forget the same line from before, and the oldest ones beyond MOST."""
     global _lines
     others = [line for line in _lines if line[0] != words]
     _lines = [*others, (words, time.monotonic() - _start)][-MOST:]

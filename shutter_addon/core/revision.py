@@ -32,7 +32,9 @@ class Revision:
         self._kept.clear()
 
     def until_change(self, what: str, key: Hashable, make: Callable[[], T]) -> T:
-        """Return what `make` returns, or raise what it raises. It is called once for a name and key until a change.
+        """Return the cached result of `make` for a name and key. `make` is called again only after a change.
+
+        An exception of `make` is cached and raised, too.
 
         This is for drawing, which happens often. Operators read anew, since they can come after a change that Blender
         has not reported yet.

@@ -17,7 +17,7 @@ def edges(polygons: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def crossings(start: np.ndarray, end: np.ndarray, lines: range) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return where edges cross the middles of lines.
+    """Return where the edges of polygons cross the middles of pixel rows (lines).
 
     Args:
         start, end: Of the edges, (n, 2).
@@ -39,7 +39,7 @@ def crossings(start: np.ndarray, end: np.ndarray, lines: range) -> tuple[np.ndar
 def fill(
     picture: np.ndarray, polygons: Sequence[np.ndarray], value: float, *, odd: bool = False, seam: float = 0.0
 ) -> bool:
-    """Set the pixels of a picture (h, w) whose middles are inside closed polygons. Return whether there are any.
+    """Set the pixels of a picture (h, w) whose middles are inside closed polygons. Return whether any pixel was set.
 
     Args:
         picture: The picture.

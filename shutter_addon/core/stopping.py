@@ -18,7 +18,7 @@ class StoppedError(Exception):
 
 
 def never() -> bool:
-    """Return False. As `stopped` of `once`, it never cancels work."""
+    """Return False: a function to pass to `once` as `stopped` for work that is never cancelled."""
     return False
 
 
@@ -26,7 +26,7 @@ def never() -> bool:
 class Slice:
     """A time slice of work that would freeze the window if it ran in one go. The next slice continues it.
 
-    Calling it returns whether its time is over.
+    Call the object to find out whether its time is over.
 
     Attributes:
         soon: When it ends (by time.monotonic) if it has kept a result for the next slice.
@@ -67,11 +67,11 @@ class Slices:
     seconds: float = 0.0
 
     def next(self, key: Hashable, first: float, least: float, *, waits: bool = True) -> Slice:
-        """Return the next slice.
+        """Begin the next time slice of work on a result, and return it. Slices grow, so that all work ends.
 
         Args:
             key: Which result is made. A new one begins with a slice of `first` seconds.
-            first: Seconds.
+            first: The length of the first slice in seconds.
             least: The least seconds of a later slice.
             waits: Whether work may wait for another thread's results.
         """
@@ -85,7 +85,7 @@ class Slices:
         return self.last
 
     def end(self) -> None:
-        """Note that the result has been made."""
+        """Note that the result has been made, so that the next slice begins a new one."""
         self.key = self.last = None
 
 
@@ -103,13 +103,13 @@ def once(stopped: Callable[[], bool]) -> Iterator[None]:
 
 
 def kept() -> None:
-    """Note that a result has been cached, so that work that ends here will not repeat this step."""
+    """Note that the result of a step is cached, so that the current time slice may end earlier (Slice.soon)."""
     if isinstance(now := _stopped.get(), Slice):
         now.has_kept = True
 
 
 def waits() -> bool:
-    """Return whether this step may wait for another thread's results."""
+    """Return whether the current work may wait for another thread's results. Only a time slice can forbid it."""
     return not isinstance(now := _stopped.get(), Slice) or now.waits
 
 

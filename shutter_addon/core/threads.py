@@ -33,7 +33,7 @@ def pool(workers: int | None = None) -> ThreadPoolExecutor:
 
 
 def fulfil(future: Future[T], function: Callable[[], T]) -> bool:
-    """Set a future to what a function returns or raises. If the future was cancelled, return False without a call."""
+    """Call a function and give its result or exception to a future. Do nothing and return False if it was cancelled."""
     if not future.set_running_or_notify_cancel():
         return False
     try:

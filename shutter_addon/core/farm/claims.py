@@ -22,7 +22,9 @@ BEAT = 10.0  # seconds between touches; network drives can show them a minute la
 
 
 class Claims:
-    """The claims that this process holds in a folder. At the end of a `with`, they are released. For any thread.
+    """The claims of this process: files in a shared folder, each of which reserves one piece of work, such as a frame.
+
+    The end of a `with` block releases all of them. Any thread may use the object.
 
     Args:
         folder: The folder, which all machines share.
@@ -49,7 +51,9 @@ class Claims:
             self.release(name)
 
     def take(self, name: str) -> bool:
-        """Try to take a claim: return whether this process has it now.
+        """Try to reserve a piece of work for this process. Return False if another process has reserved it.
+
+        A claim that another process has abandoned is taken over.
 
         Check after this call whether the work has been done already, since the last holder may have finished it.
 
@@ -69,25 +73,25 @@ class Claims:
         return True
 
     def release(self, name: str) -> None:
-        """Release a claim of this process: remove its file, and those of earlier generations."""
+        """Release a claim of this process: remove its file, and those of abandoned claims to the same work."""
         with self._lock:
             generation = self._held.pop(name)
         for each in range(generation, -1, -1):
             _remove(self._path(name, each))
 
     def _path(self, name: str, generation: int) -> Path:
-        """Return the file of a claim's generation."""
+        """Return the path of a claim's file. The generation counts how often the claim was taken over, from 0."""
         return self._folder / f".claim-{name}-{generation}"
 
     def _is_abandoned(self, path: Path) -> bool:
-        """Return whether a claim of another process has not changed for too long."""
+        """Return whether this process has seen no change in another's claim for more than `patience` seconds."""
         now, look = time.monotonic(), _look(path)
         if self._seen.get(path, (None,))[0] != look:
             self._seen[path] = look, now
         return look is not None and now - self._seen[path][1] > self._patience
 
     def _touch(self) -> None:
-        """Touch the claims held here every few seconds, until the `with` block ends. It runs on a thread of its own."""
+        """Touch the files of claims held here every `beat` seconds, until the `with` block ends, on its own thread."""
         while not self._ended.wait(self._beat):
             with self._lock:
                 held = list(self._held.items())
@@ -97,7 +101,7 @@ class Claims:
 
 
 def _make(path: Path) -> bool:
-    """Create the file of a claim; return False if it exists.
+    """Create the file of a claim. Return True, or False if the file exists already.
 
     Its content tells people whose it is, and makes it differ from a later claim of the same name.
     """
@@ -115,7 +119,9 @@ def _make(path: Path) -> bool:
 
 
 def _look(path: Path) -> tuple[bytes, int] | int | None:
-    """Return a value that changes when the file of a claim is touched or replaced; None: it is missing.
+    """Return a value that changes when the file of a claim is touched or replaced.
+
+    This is (content, time of change in ns), an error number if the file cannot be read, or None if it is missing.
 
     The file is opened, since network drives then look at its present state.
     """
@@ -129,6 +135,6 @@ def _look(path: Path) -> tuple[bytes, int] | int | None:
 
 
 def _remove(path: Path) -> None:
-    """Remove the file of a claim, if possible."""
+    """Remove the file of a claim, and ignore errors, such as a missing file."""
     with suppress(OSError):  # removed by another process, or another user's
         path.unlink()

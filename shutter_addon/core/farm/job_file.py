@@ -52,7 +52,7 @@ def note(key: str) -> str:
 
 
 def key_in(text: str) -> str | None:
-    """Return the key in a picture's metadata that `note` made, or None."""
+    """Find the key of an edit's version in a text of a picture's metadata that `note` made. None: it has no key."""
     match = re.fullmatch(re.escape(_NOTE) + "([0-9a-f]{16})", text)
     return match and match[1]
 

@@ -68,7 +68,7 @@ def _rounded(factor: int) -> int:
 
 
 def chroma_step(length: int) -> int:
-    """Return how far apart neighboring pixels are in the chroma planes, in 1/65536 of a sample.
+    """Return the distance of neighboring pixels in a chroma plane of half the size, in 1/65536 of a chroma sample.
 
     Pixel i has the chroma sample (i · step + step // 2) >> 16.
 
@@ -120,7 +120,7 @@ class Planes:
 
 
 def _chroma_places(chosen: slice, length: int) -> np.ndarray:
-    """Return the indices of the chroma samples of some pixels on an axis of `length` pixels."""
+    """Return which chroma sample belongs to each chosen pixel, as indices, on an axis of `length` pixels."""
     step = chroma_step(length)
     return (np.arange(length)[chosen] * step + step // 2) >> 16
 
@@ -129,10 +129,10 @@ class Pair(Protocol):
     """Makes the moments between two frames, by their optical flow (media/flow.py has the only implementation)."""
 
     def with_ends(self, first: np.ndarray, second: np.ndarray) -> Pair:
-        """Return a copy for two other frames (H, W, 4), to which the same flow applies."""
+        """Return a copy that makes moments between two other frames (H, W, 4), by the same optical flow."""
 
     def moment(self, pair: tuple[int, int], number: int, steps: int) -> np.ndarray | Moment:
-        """Return a moment between the frames. If they have nothing in common, it is the nearer frame (H, W, 4) itself.
+        """Return a moment, a frame between the two in time, or the nearer one (H, W, 4) if they have nothing in common.
 
         Args:
             pair: The numbers of the frames, for Moment.pair.
@@ -144,7 +144,11 @@ class Pair(Protocol):
         """Make the frame (H, W, 4) of a moment, as FrameSource.read gives it."""
 
     def values(self, moment: Moment, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """Return values (H, W) at a moment, given those of both frames, float32, which move like the frames."""
+        """Return values of pixels, such as a matte's, at a moment: float32 (H, W), moved by the frames' optical flow.
+
+        Args:
+            moment: The moment.
+            first, second: The values (H, W) in the first and the second frame."""
 
 
 @dataclass(frozen=True)
@@ -180,7 +184,7 @@ class Moment:
 
     @property
     def nbytes(self) -> int:
-        """The bytes that it takes: its part of the frames and vectors that all moments of the pair share."""
+        """The bytes of memory that this moment takes: its part of what all moments of the pair share."""
         return (self.vectors.nbytes + sum(end.nbytes for end in self.ends)) // self.steps
 
 
@@ -195,7 +199,7 @@ def as_rgba(frame: Decoded) -> np.ndarray:
 class ShotFinder(Protocol):
     """Finds the cuts of a source (media/cuts.py). Frames are numbered from 0.
 
-    It may read frames. These are kept until the source's `read` is called for them, so that none is decoded twice.
+    It may read frames. It keeps them until the source's `read` asks for them, so that no frame is decoded twice.
     """
 
     def around(self, index: int, low: int, high: int, *, known: bool = False) -> range:
@@ -212,10 +216,10 @@ class ShotFinder(Protocol):
         """Return the frames that `around` would have to read for the same arguments, if it finds no new cuts."""
 
     def handed(self) -> set[int]:
-        """Return the frames that were read and are kept for `read`."""
+        """Return the frames that were read to find cuts, and are kept for `FrameSource.read`."""
 
     def release(self) -> None:
-        """Drop the frames that are kept for `read`."""
+        """Drop the frames that were read to find cuts and are kept for `FrameSource.read`."""
 
 
 class FrameSource(ABC):
@@ -295,10 +299,10 @@ class FrameSource(ABC):
 
 
 class SourceFile(Hashable, Protocol):
-    """Opens a source, such as that of a matte. Two are equal if they give the same frames.
+    """The name of a source of frames, such as a matte file, which can be opened. Equal ones give the same frames.
 
-    Frames of a matte are values (height, width) float32, 0 to 1, and `read` takes any index: it clamps it to the file's
-    frames.
+    Frames of a matte are values (height, width) float32, 0 to 1, and `read` takes any index: it clamps the index to the
+    file's frames.
     """
 
     def open(self) -> FrameSource:
@@ -310,7 +314,7 @@ class SourceFile(Hashable, Protocol):
 
 
 class _Forwarded:
-    """A descriptor that returns the wrapped source's attribute of this name, unless the wrapper sets its own."""
+    """A descriptor of SourceWrapper: it returns the wrapped source's attribute, unless the wrapper has set its own."""
 
     def __init__(self, name: str) -> None:
         self._name = name
@@ -327,7 +331,8 @@ class SourceWrapper(FrameSource):
 
         Args:
             source: The other source.
-            frames: Returns the frame of an index, and replaces `decoded` and `read`. None: they are the source's.
+            frames: Returns the frame of an index; `read` and `decoded` then use it. None: both return what the source's
+                `read` returns.
         """
         self._source, self._frames_of = source, frames
 

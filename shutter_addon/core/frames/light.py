@@ -28,17 +28,17 @@ def to_encoded(linear: ArrayLike) -> np.ndarray:
 
 
 def premultiplied(rgba: np.ndarray, convert: Callable[[np.ndarray], np.ndarray] | None = None) -> np.ndarray:
-    """Convert straight RGBA (…, 4) to premultiplied. `convert` converts its colours (…, 3) before that."""
+    """Convert straight RGBA (…, 4) to premultiplied. First apply `convert` to the colours (…, 3), not to alpha."""
     rgb = rgba[..., :3] if convert is None else convert(rgba[..., :3])
     return np.concatenate([rgb * rgba[..., 3:], rgba[..., 3:]], axis=-1)
 
 
 def over_black(frame: np.ndarray, alpha: str) -> np.ndarray:
-    """Return a source's frame (…, 4) over black, as code values.
+    """Return a source's frame (…, 4) as it looks over black: RGBA code values, with straight alpha premultiplied.
 
     Args:
         frame: Samples as from FrameSource.read.
-        alpha: The source's.
+        alpha: FrameSource.alpha: "opaque", "straight" or "premultiplied".
 
     Returns:
         float32, 0 … 1, if samples are floats or alpha is straight. Other integers stay as they are.
@@ -63,6 +63,6 @@ def linearised(rgba: np.ndarray) -> np.ndarray:
 
 
 def _cover(rgba: np.ndarray) -> np.ndarray:
-    """Return what colours were premultiplied with, (…, 1): the alpha, or 1 where that is 0."""
+    """Return the factor (…, 1) that premultiplied colours contain: alpha, or 1 where alpha is 0 within rounding."""
     alpha = rgba[..., 3:]
     return np.where(alpha > 1e-6, alpha, 1)  # a smaller alpha is rounding and counts as transparent

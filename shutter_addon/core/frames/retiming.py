@@ -94,7 +94,7 @@ def playback_rate(strip: StripTiming, length: int, fps: float) -> float:
 
 
 def retimed(keys: Sequence[RetimingKey], position: float | np.float32) -> np.float32:
-    """Return the position in the content, 0 to 1, that retiming keys show at a position before retiming, in frames.
+    """Apply retiming keys: convert a position in frames, before retiming, to the position in the content, 0 to 1.
 
     It is linear between keys, and an arc where Blender makes a smooth transition between two speeds.
     """
@@ -111,7 +111,7 @@ def retimed(keys: Sequence[RetimingKey], position: float | np.float32) -> np.flo
 
 
 def _speed(first: RetimingKey, second: RetimingKey) -> np.float32:
-    """Return the change of the shown position (0 to 1) per frame between two keys."""
+    """Return the speed between two retiming keys: by how much the shown position (0 to 1) changes per frame."""
     return np.float32(second.factor - first.factor) / np.float32(max(second.index - first.index, 1e-9))
 
 

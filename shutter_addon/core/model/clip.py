@@ -73,7 +73,7 @@ class Clip:
     def position(self, frame: float) -> float:
         """Return the place in the footage that a timeline frame shows, as a frame number from 0 that is not rounded.
 
-        Strobe, which holds frames of a strip, is ignored. Exposures that last a timeline frame are measured by it.
+        Strobe, which holds frames of a strip, is ignored. The position measures exposures that last a timeline frame.
         """
         if isinstance(self.timing, StripTiming):
             length, rate = self._content(self.timing)
@@ -83,9 +83,9 @@ class Clip:
 
     @property
     def ends(self) -> tuple[float, float]:
-        """The values of `position` at the first and last frame of a strip's content, which it holds beyond its ends.
+        """The positions in the footage of the first and last frame of a strip's content, in frames (see `position`).
 
-        Without a strip they are −∞ and ∞: no frame is held.
+        Beyond its ends the strip holds these frames. Without a strip the values are −∞ and ∞: no frame is held.
         """
         if isinstance(self.timing, StripTiming):
             first, (length, _rate) = self.timing.start, self._content(self.timing)
@@ -116,7 +116,7 @@ class Clip:
     def _content(self, strip: StripTiming) -> tuple[int, float]:
         """Return how many filmed frames a strip has after trimming, and how many pass per timeline frame.
 
-        The second is the playback rate before retiming.
+        The second number is the playback rate before retiming.
         """
         filmed = (self.count - 1) // self.step + 1
         length = max(1, filmed - strip.content_trim_start - strip.content_trim_end)

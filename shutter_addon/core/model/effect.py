@@ -82,16 +82,16 @@ class Subject:
     drawings: Drawings | None = None
 
     def placement(self, frame: float) -> Placement:
-        """Return where keys put the subject at a frame, apart from what is drawn."""
+        """Return the location, rotation and scale that keys give the subject at a frame, whatever is drawn."""
         return self.moves.at(frame)
 
     def centre(self, frame: float) -> np.ndarray | None:
         """Return the point (2,) about which the subject turns and scales, in fractions of the picture.
 
-        Its location is not added.
+        This is where it is drawn, before its keys move it. A subject without drawings has the picture's centre.
 
         Returns:
-            None where nothing is drawn.
+            The point, or None if there are no strokes at this frame.
 
         Raises:
             EffectError: The strokes are too far outside the picture.
@@ -498,7 +498,7 @@ class Effect:
 
     @cached_property
     def _one_too_many(self) -> str | None:
-        """The name of the first region with which the effect has more than limits.MAX_POINTS points, or None.
+        """The name of the region with which the sum of drawn points first exceeds limits.MAX_POINTS, or None.
 
         Each region counts with its largest drawing. Layers and outlines count, too.
         """
@@ -524,7 +524,7 @@ class Effect:
 
         Args:
             index: The shutter's index, for the error's message.
-            frame: The frame of the bars, likewise.
+            frame: The frame of the bars, for the error's message.
             bars: The bars.
 
         Raises:

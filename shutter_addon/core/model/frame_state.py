@@ -161,7 +161,7 @@ class Following:
         return self.first, self.turns.tobytes(), self.shifts.tobytes()
 
     def moving(self) -> np.ndarray:
-        """Return the indices of shutters whose exposures move."""
+        """Return the indices of shutters that follow a motion other than standing still."""
         return np.flatnonzero((self.turns != 1).any(axis=0) | self.shifts.any(axis=0))
 
     def of(self, chosen: slice | Sequence[int]) -> Following | None:
@@ -240,8 +240,8 @@ class FrameState:
     def gains(self) -> np.ndarray:
         """The factor (N,) for the brightness of each shutter.
 
-        It is 1. If `exposure` is "weighted", it is the sum of a shutter's bars over the reference, for shutters that
-        average. Factors scale linear light, as an aperture would; encoded values are decoded first.
+        It is 1 by default. If `exposure` is "weighted", it is the sum of a shutter's bars / `reference`, for
+        shutters that average. Factors scale linear light, as an aperture would; encoded values are decoded first.
         """
         exposures = self.bars.sum(axis=1)
         gains = np.ones_like(exposures)
@@ -254,7 +254,7 @@ class FrameState:
     def open_span(self) -> tuple[int, int]:
         """The index of the first frame of the window that any shutter exposes, and one past the last.
 
-        A threshold needs the shown frame, so this is included then.
+        If a shutter has a threshold, which needs the shown frame, the span includes that frame.
         """
         first, last = shutters.open_span(self.bars)
         if any(combine.threshold is not None for combine in self.combines):
@@ -263,7 +263,7 @@ class FrameState:
 
     @cached_property
     def groups(self) -> dict[Combine, tuple[int, ...]]:
-        """The indices of shutters that combine frames in the same way, by that way.
+        """The shutters grouped by how they combine frames: {Combine: indices of shutters}.
 
         Shutters of a group are interpolated with each other. The pictures of different groups are mixed.
         """
@@ -295,7 +295,7 @@ class FrameState:
     def in_blocks(self, aggregate: int) -> FrameState:
         """Return the state with another Options.aggregate (the side of the blocks of pixels that share a shutter).
 
-        That of drawn layers changes as well.
+        The blocks of drawn layers change as well.
         """
         if aggregate == self.options.aggregate:
             return self
@@ -305,7 +305,9 @@ class FrameState:
         return replace(self, options=replace(self.options, aggregate=aggregate), layers=layers)
 
     def of(self, chosen: Sequence[int]) -> FrameState:
-        """Return the state of the chosen shutters (by index) alone, without scribbles, mattes and layers."""
+        """Return the state of the chosen shutters (by index) alone, without scribbles, mattes and layers.
+
+        Its Options.edge_aware is 0."""
         return FrameState(
             options=replace(self.options, edge_aware=0.0),
             bars=self.bars[list(chosen)],

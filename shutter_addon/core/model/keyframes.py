@@ -210,7 +210,7 @@ class Bars:
 
 
 def eased_span(frames: Sequence[float], eases: Sequence[Ease], frame: float) -> tuple[int, int, float]:
-    """Return `span`, with the share after easing.
+    """Return the indices of the keys before and after a frame, and the eased share 0 to 1 of the way between them.
 
     Args:
         frames: The keys' frames, ascending.

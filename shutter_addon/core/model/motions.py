@@ -53,7 +53,7 @@ class Similarity:
     shift: complex = 0j
 
     def __call__(self, points: Points) -> Points:
-        """Return where points, x + iy, go."""
+        """Move points, complex numbers x + iy in pixels, and return where they go."""
         return self.turn * points + self.shift
 
     def after(self, first: Similarity) -> Similarity:
@@ -61,7 +61,7 @@ class Similarity:
         return Similarity(self.turn * first.turn, self(first.shift))
 
     def inverse(self) -> Similarity:
-        """Return the motion that takes points back."""
+        """Return the opposite motion, which takes moved points back to where they were."""
         return Similarity(1 / self.turn, -self.shift / self.turn)
 
 
@@ -144,13 +144,13 @@ def unwound(placement: Placement, near: Placement) -> Placement:
 
 
 def between(first: Placement, second: Placement, share: float) -> Placement:
-    """Return the placement a share 0 to 1 of the way between two, each number by itself, as between linear keys."""
+    """Interpolate two placements linearly at a share 0 to 1 of the way, each number by itself."""
     numbers = (1 - share) * as_array([first]) + share * as_array([second])
     return _placement(numbers[0])
 
 
 def only(placement: Placement, motion: Motion) -> Placement:
-    """Return a placement with only what counts for a motion: its location, also its rotation, or also its scale."""
+    """Reduce a placement to what counts for a motion: location; location and rotation; or these and scale."""
     rotation = 0.0 if motion == "location" else placement.rotation
     return Placement(placement.location, rotation, placement.scale if motion == "scale" else 1.0)
 
@@ -210,7 +210,7 @@ def _placement(numbers: np.ndarray) -> Placement:
 
 
 def _distances(frames: np.ndarray, numbers: np.ndarray, points: np.ndarray, size: Size) -> np.ndarray:
-    """Return how far a shape's points are off at each frame if only the first and last frames have keys.
+    """Return the error of a shape's motion at each frame if it had keys only at the first and last frame.
 
     Args:
         frames: (f,).

@@ -151,7 +151,7 @@ def in_order(drawings: Iterable[Curves], aspect: float) -> list[Curves]:
 
 
 def _differ(curve: np.ndarray, other: np.ndarray) -> float:
-    """Return the largest distance between equal sides of two curves' bounding boxes, in units of the longest side."""
+    """Return how much two curves' bounding boxes differ: the largest distance of equal sides / the longest side."""
     boxes = np.array([(points.min(axis=0), points.max(axis=0)) for points in (curve, other)])
     sides = float(np.ptp(boxes, axis=1).max())
     return float(np.abs(boxes[0] - boxes[1]).max()) / max(sides, 1e-9)
@@ -169,7 +169,7 @@ def _turned(curve: np.ndarray) -> np.ndarray:
 
 
 def _aligned(before: np.ndarray, curve: np.ndarray, aspect: float) -> np.ndarray:
-    """Return a curve (n, 2) that begins at another of its points, so that each point is near that of `before`."""
+    """Rotate the order of a closed curve's points (n, 2), so that each is near the point of `before` with its index."""
     fixed, moved = ((points - points.mean(axis=0)) * (aspect, 1) for points in (before, curve))
     alike = sum(np.fft.irfft(np.conj(np.fft.rfft(fixed[:, k])) * np.fft.rfft(moved[:, k]), len(curve)) for k in (0, 1))
     return np.roll(curve, -int(np.argmax(alike)), axis=0)

@@ -50,7 +50,7 @@ class Gap(NamedTuple):
 
     Attributes:
         first, last: The first and the last of these frames, or −∞ and ∞.
-        hard_first, hard_last: Whether the first, or the last, is at a cut, where nothing fades.
+        hard_first, hard_last: Whether the first, or the last, frame is at a cut, where nothing fades.
     """
 
     first: float
@@ -94,7 +94,9 @@ def keys(
 
 
 def gaps(seen: Collection[int], stops: Iterable[Stop], beside: int = 0) -> list[Gap]:
-    """Return the gaps of a track at its stops, ascending; those that touch become one. Arguments as for `keys`."""
+    """Return the spans of frames without the subject (gaps), ascending, with adjoining ones merged.
+
+    Arguments as for `keys`."""
     merged: list[Gap] = []
     for each in sorted(_gap(seen, stop) for stop in stops):
         gap = each._replace(first=each.first - beside, last=each.last + beside)

@@ -45,10 +45,10 @@ class Shape:
 
 
 def layers(shapes: Collection[Shape]) -> list[tuple[float, tuple[Shape, ...]]]:
-    """Split shapes that have opacities into sets of opaque shapes.
+    """Replace shapes that have opacities by sets of opaque shapes, each set with a share of the result.
 
-    How much of each shutter a pixel gets is the mean of what the sets give. So at an opacity of one half, it is halfway
-    between that with and that without the shape.
+    How much of each shutter a pixel gets is the mean of what the sets give. So a shape with an opacity of one half
+    has half of its effect.
 
     Returns:
         (share, shapes) for each set. The shares are the weights of the mean, and sum to 1. The first set has all shapes
@@ -81,7 +81,7 @@ def between_strokes(
     """Return strokes between those of two drawings, paired in order.
 
     Strokes with equal numbers of points move point by point, others by distance along the stroke. A stroke of the first
-    drawing without a partner stays; one of the second appears when that is reached.
+    drawing without a partner stays; one of the second appears at u = 1.
 
     Args:
         first, second: The strokes (n, 2) of the drawings.
@@ -253,7 +253,7 @@ def _draw(labels: np.ndarray, points: np.ndarray, radius: float, label: int) -> 
 
 
 def _seen(starts: np.ndarray, steps: np.ndarray, size: np.ndarray, reach: float) -> np.ndarray:
-    """Return between which shares of its length, 0 to 1, each segment is near a picture, (2, n).
+    """Return which part of each line segment is near a picture: from and to which share of its length, 0 to 1, (2, n).
 
     Args:
         starts, steps: (n, 2), the segments' starts, and the way to their ends, in pixels.

@@ -208,7 +208,7 @@ def resample(bars: ArrayLike, window: int) -> np.ndarray:
 
 
 def spanning(bars: ArrayLike, start: float, end: float) -> np.ndarray:
-    """Return bars (L,) of the same shape and sum, stretched or shrunk in time.
+    """Stretch or shrink the open part of bars (L,) in time, and keep its shape and sum.
 
     Args:
         bars: (L,).

@@ -71,8 +71,8 @@ def state_at(effect: Effect, clip: Clip, frame: float) -> Moment:
 def _in_moments(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameState:
     """Return the state with bars and window in the clip's moments: filmed frames, and those made between them.
 
-    There are `clip.step` per filmed frame. Bars that are only the shape of an exposure keep that shape: they are spread
-    evenly.
+    There are `clip.step` moments per filmed frame. Bars that are only the shape of an exposure are spread evenly, so
+    that the shape stays.
     """
     options = replace(state.options, window=state.options.window * clip.step, step=clip.step, backward=at.direction < 0)
     if clip.step == 1:
@@ -134,7 +134,9 @@ def _matte(region: Region | MatteRegion, frame: float, share: float) -> Matte | 
 def _scribbles(
     effect: Effect, state: FrameState, drawn: Sequence[tuple[int, Region]], count: int, frame: float, share: float
 ) -> FrameState:
-    """Return a state of Layers.scribbles between two timeline frames. Its shutter 1 + i stands for layer i.
+    """Return a state with the shapes of regions between two timeline frames, for Layers.scribbles.
+
+    Shutter 1 + i of this state stands for layer i, and shutter 0 for what belongs to no layer.
 
     Args:
         effect: The effect.
@@ -168,7 +170,7 @@ Places = Callable[[float], tuple[Placement, np.ndarray | None]]
 
 
 def followed(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameState:
-    """Return the state with the motions that shutters follow, and with the lengths of exposures that depend on them.
+    """Add the motions that shutters follow to the state, and the lengths of exposures that depend on these motions.
 
     Raises:
         EffectError: The strokes of something followed are too far outside the picture.
@@ -195,7 +197,9 @@ def followed(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameS
 
 
 def _with_trails(effect: Effect, state: FrameState, following: Following, clip: Clip, at: Shown) -> np.ndarray:
-    """Return the bars (N, L) of the state with lengths that depend on a motion: of trails, and by Camera.influence."""
+    """Return the state's bars (N, L), stretched or shortened where a motion sets the exposure's length.
+
+    Trails are open while what they follow moves by their distance; Camera.influence shortens the camera's exposures."""
     bars = state.bars.copy()
     positions = windows.positions(state.options, at.source_frame, at.direction)
     shown_at = float(np.abs(positions - at.source_frame).argmin()) + 0.5
@@ -217,7 +221,7 @@ def _with_trails(effect: Effect, state: FrameState, following: Following, clip: 
 def reach(filmed: int) -> int:
     """Return how many timeline frames before and after the shown one are searched for a window's source frames.
 
-    It suffices for footage at a quarter of its speed. Source frames beyond get the motion of the nearest one.
+    This is 4 × the window, enough for footage at a quarter of its speed. Source frames beyond get the nearest motion.
 
     Args:
         filmed: The number of filmed frames in the window.
@@ -273,7 +277,7 @@ def times_of(clip: Clip, at: Shown, wanted: range, reach: int) -> list[float]:
 def smoothing(smooth: int) -> np.ndarray:
     """Return weights (2 · smooth + 1,) with the sum 1 for averaging a motion over `smooth` frames on each side.
 
-    They form a bell, since a box would leave jolts.
+    The weights form a bell, since equal ones would leave jolts.
     """
     bell = 1 + np.cos(np.pi * np.arange(-smooth, smooth + 1) / (smooth + 1))
     return bell / bell.sum()
@@ -308,7 +312,7 @@ def places_of(subject: Subject, motion: motions.Motion = "scale", smooth: int = 
 
 
 def moves(places: Places, clip: Clip, frame: float, times: list[float]) -> np.ndarray:
-    """Return the motions of the picture from a timeline frame to several times: turns and shifts (2, n) complex128.
+    """Return the motions by which a subject goes from a timeline frame to n times: turns and shifts, (2, n) complex128.
 
     Args:
         places: From `places_of`.
@@ -321,7 +325,7 @@ def moves(places: Places, clip: Clip, frame: float, times: list[float]) -> np.nd
 
 
 def motion_to(places: Places, frame: float, time: float, size: tuple[int, int]) -> Similarity:
-    """Return the motion of the picture from a timeline frame to a time; no motion if nothing is drawn.
+    """Return the motion by which a subject goes from a timeline frame to a time; no motion if nothing is drawn.
 
     Args:
         places: From `places_of`.
@@ -414,7 +418,7 @@ def with_length(bars: np.ndarray, way: np.ndarray, length: float, shown: float) 
 
 
 def exposed(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameState:
-    """Return the state with the bars of shutters whose `length` is "timeline": they expose one timeline frame."""
+    """Replace the bars of shutters whose `length` is "timeline", so that they expose one timeline frame."""
     chosen = [i for i, shutter in enumerate(effect.shutters) if shutter.length == "timeline"]
     if not chosen:
         return state
@@ -465,7 +469,7 @@ def on_timeline(bars: np.ndarray, options: Options, positions: np.ndarray) -> np
 def _spread(start: float, end: float, window: int) -> np.ndarray:
     """Return which share (L,) of the time from `start` to `end` falls on each of a window's L frames.
 
-    Times count from its first frame. What lies outside is lost. A time without length falls on one frame.
+    Times are in frames from the window's start. What lies outside is lost. A time without length falls on one frame.
     """
     if end - start < _INSTANT:
         return (np.arange(window) == np.floor(start + _INSTANT)).astype(float)

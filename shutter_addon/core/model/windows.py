@@ -15,7 +15,9 @@ from .frame_state import FrameState, Options
 
 
 def positions(options: Options, index: int, direction: int = 1) -> np.ndarray:
-    """Return the positions (L,) of the frames that can be exposed when a frame is shown, in the window's order.
+    """Return the frame numbers (L,) of a window around a shown frame, as if the footage had no ends.
+
+    They are in the window's order, from its first frame to its last.
 
     A filmed frame lasts until the next one. So if the footage plays backward, the moments after it come first, and the
     filmed frame last.
@@ -29,14 +31,18 @@ def positions(options: Options, index: int, direction: int = 1) -> np.ndarray:
 
 
 def reach(state: FrameState, index: int, direction: int = 1) -> tuple[int, int]:
-    """Return the lowest and the highest position that any shutter exposes. Arguments as for `positions`."""
+    """Return the lowest and the highest position, as a frame number of the footage, that any shutter exposes.
+
+    Positions can lie beyond the footage. Arguments as for `positions`."""
     first = origin(state.options, index, direction)
     ends = [first + direction * place for place in (state.open_span[0], state.open_span[1] - 1)]
     return min(ends), max(ends)
 
 
 def origin(options: Options, index: int, direction: int = 1) -> int:
-    """Return the position of the window's first frame. Arguments as for `positions`."""
+    """Return the position of the window's first frame, as a frame number of the footage, possibly beyond its ends.
+
+    Arguments as for `positions`."""
     return (index if direction > 0 else index + options.step - 1) - direction * options.before
 
 

@@ -50,7 +50,7 @@ def counts(combine: Combine, bars: ArrayLike, coefficients: ArrayLike, interpola
 
     Args:
         combine: How frames are combined.
-        bars: (N, L).
+        bars: (N, L), of N shutters.
         coefficients: (…, N), how much of each shutter a pixel gets.
         interpolation: Options.interpolation.
     """
@@ -100,10 +100,10 @@ def of_samples(combine: Combine, samples: Sequence[Sample], *, encoded: bool = F
 
 
 def _counted(combine: Combine, sample: Sample, encoded: bool) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return (light, weight) of a frame for each time that it counts.
+    """Return a frame as a list of one or two pairs (light, weight), after the threshold of `combine`.
 
-    Without a threshold, that is once. A threshold lowers the weight where the light does not pass it, and the shown
-    frame also counts in full.
+    Without a threshold, the only pair is the frame itself. A threshold lowers its weight where the light does not pass.
+    The shown frame then has a second pair, with weight 1.
     """
     if combine.threshold is None:
         return [(sample.light, sample.weight)]
@@ -121,7 +121,7 @@ def _luminance(value: np.ndarray) -> np.ndarray:
 
 
 def passes(combine: Combine, luminance: np.ndarray) -> np.ndarray:
-    """Return how much light of a luminance (…) passes the threshold of `combine` and leaves a trail, 0 to 1."""
+    """Return how much light of a luminance (…) leaves a trail, 0 to 1: above the threshold, or below for darkest."""
     half = max(combine.softness, 1e-6) / 2
     t = np.clip((luminance - ((combine.threshold or 0.0) - half)) / (2 * half), 0, 1)
     t = t * t * (3 - 2 * t)
@@ -185,7 +185,7 @@ def mixed_shutter(state: FrameState, coefficients: ArrayLike) -> np.ndarray:
 
 
 def ways(state: FrameState, coefficients: np.ndarray) -> Iterator[tuple[list[int], np.ndarray, np.ndarray]]:
-    """Yield the shutters that combine frames in the same way (*Combine*), for one way after another.
+    """Group shutters by how they combine frames (average, lightest, …). Yield one group after another.
 
     Args:
         state: The effect at a frame.
@@ -305,9 +305,10 @@ def _samples(
 
 
 def _motions(state: FrameState, coefficients: np.ndarray, moves: Moves | None) -> list[Moves | None]:
-    """Return the motions by which pixels see frames: turns and shifts (L, H, W), or None where nothing is followed.
+    """Return the motions by which pixels see L frames: a list of (turns, shifts), or [None] if nothing is followed.
 
-    By value interpolation there is one for each shutter, else one that mixes those of the shutters in each pixel.
+    With value interpolation there is a motion (L, 1, 1) for each shutter. Otherwise there is one (L, H, W), which mixes
+    the motions of the shutters in each pixel.
     """
     if moves is None:
         return [None]

@@ -34,7 +34,7 @@ def resistances(guide: np.ndarray, strength: float) -> np.ndarray:
 
 
 def cell_side(cells: tuple[int, int], pixels: tuple[int, int]) -> int:
-    """Return the side of a guide's cells in pixels, a power of two.
+    """Return how many pixels wide and high a cell of the guide (the reduced picture) is: a power of two.
 
     Args:
         cells: The rows and columns of the guide.
@@ -62,7 +62,7 @@ def of_pixels(cells: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
 
 
 def conductances(guide: np.ndarray, strength: float, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the conductances between each pixel and its right neighbour, and between each and the one below.
+    """Return how freely coefficients spread (conductances) from each pixel to the right and to the one below.
 
     Args:
         guide, strength: As for `resistances`.

@@ -38,7 +38,7 @@ _CELLS = 4
 
 
 def matte_of(coefficients: ArrayLike) -> np.ndarray:
-    """Return the matte (…), 0 to 1, of a layer of strokes from the coefficients (…) that are diffused from these."""
+    """Convert the coefficients (…) that were diffused from a layer's strokes to the layer's matte (…), 0 to 1."""
     values = (np.asarray(coefficients) - NONE) / (WHOLE - NONE)
     return np.clip(values, 0, 1)
 
@@ -89,7 +89,7 @@ def separated(colors: np.ndarray, matte: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 def _nearer(picture: np.ndarray, matte: np.ndarray, own: np.ndarray, behind: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return estimated subject and background colours (C, …) corrected so that they mix to the picture's.
+    """Correct estimated colours of a subject and its background so that they mix to the picture's: (C, …) each.
 
     Args:
         picture: The exact mixed colours (C, …).

@@ -22,7 +22,7 @@ class Display:
     transfer: Callable[[np.ndarray], np.ndarray]
 
     def levels(self, light: np.ndarray, noise: np.ndarray) -> np.ndarray:
-        """Return the levels uint8 of light (…, C) float32, with the noise (…) of its pixels added for dither."""
+        """Convert light (…, C) float32 to levels uint8, with the noise (…) of each pixel added for dither."""
         return rounded(self.transfer(light) + noise[..., None])
 
     def noise(self, width: int, height: int) -> np.ndarray:

@@ -88,7 +88,7 @@ def with_keys(effect: Effect, shown: range, contents: Iterable[FileContent | Ram
 
 
 def _free(name: str, taken: Collection[str]) -> str:
-    """Return the name, with the first number after it that makes it differ from the names in `taken`."""
+    """Return the name if it is not in `taken`, else the name with a number, from 2, that makes it differ from those."""
     ends = itertools.chain([""], (f" {number}" for number in itertools.count(2)))
     numbered = (name[: limits.MAX_NAME - len(end)] + end for end in ends)
     return next(each for each in numbered if each not in taken)
@@ -129,9 +129,9 @@ def _shutter(
 
 
 def _said(part: Any, shown: range) -> dict[str, Any]:
-    """Return the properties of an effect, shutter, region or camera as a recipe has them: with keys, or constant.
+    """Return the properties of an effect, shutter, region or camera as a recipe has them: {attribute's name: value}.
 
-    They are by the names of the model's attributes.
+    Values over time become channels with keys, or constant ones.
     """
     said: dict[str, Any] = {}
     for name, each in fields_of(part.__class__).items():
@@ -170,7 +170,7 @@ def _bars(effect: Effect, index: int, interpolation: Interpolation, shown: range
 
 
 def _keyed(eased: _Eased, value: Callable[[float], Any], shown: range) -> Keys:
-    """Return a channel with keys of a recipe.
+    """Return a channel that has the value at each of the keys, with frames counted as in a recipe.
 
     Args:
         eased: Timeline frames and eases of the keys.
@@ -188,10 +188,10 @@ def _time(time: Channel, shown: range) -> SourceTime:
 
 
 def _number_keys(at: Callable[[float], float], channel: Channel, shown: range) -> Keys:
-    """Return a channel with the keys of a number.
+    """Find keys for a number that changes over time, and return them as a channel of a recipe.
 
     Args:
-        at: Returns its value at a timeline frame.
+        at: Returns the number at a timeline frame.
         channel: The channel of the effect; if it is sampled, it has the keys to begin with.
         shown: As for `with_keys`.
     """
@@ -204,7 +204,7 @@ def _number_keys(at: Callable[[float], float], channel: Channel, shown: range) -
 
 
 def _straight(at: Callable[[float], np.ndarray], allowed: Callable[[np.ndarray], ArrayLike]) -> _Fits:
-    """Return a function for `_keys` that tells whether numbers are right if they are linear between two keys.
+    """Return a test for `_keys`: whether linear interpolation between two keys gives the right numbers at a frame.
 
     Args:
         at: Returns the exact numbers at a timeline frame.
@@ -288,9 +288,9 @@ def _move_keys(moving: Subject, fixed: Mapping[float, Ease], shown: range) -> _E
 
 
 def _drawings(drawings: Drawings, frame: float) -> dict[float, list[np.ndarray]]:
-    """Return the drawings of a region: strokes (n, 2) as they lie at a frame, by the frames where they were drawn.
+    """Return the drawings of a region as {frame where it was drawn: strokes (n, 2) as they lie at `frame`}.
 
-    Those before the first one with strokes are left out.
+    Drawings before the first one with strokes are left out.
     """
     result: dict[float, list[np.ndarray]] = {}
     for index, number in enumerate(drawings.frames):
@@ -314,7 +314,7 @@ def _keys(fits: _Fits, eases: Mapping[float, Ease], fixed: Mapping[float, Ease],
         return [(frame, "linear") for frame in shown]
 
     def per_frame(outside: range, held: float) -> list[tuple[float, Ease]]:
-        """Return a key for each frame of `outside`, before or after all keys; none if the value at `held` fits."""
+        """Return a linear key for each frame of `outside`, or none if the value at `held` is right for all."""
         return [] if all(fits(held, held, frame, 0) for frame in outside) else [(frame, "linear") for frame in outside]
 
     kept = per_frame(range(shown.start, min(math.ceil(frames[0]), shown.stop)), frames[0])
@@ -336,7 +336,7 @@ def _keys(fits: _Fits, eases: Mapping[float, Ease], fixed: Mapping[float, Ease],
 
 
 def _short(value: float) -> float:
-    """Return the shortest decimal number with the same float32."""
+    """Return the shortest decimal number that is the same float32 as `value`."""
     return float(str(np.float32(value)))
 
 
@@ -348,5 +348,5 @@ def _short_degrees(degrees: float) -> float:
 
 
 def _frame(frame: float, shown: range) -> float:
-    """Return the number that a timeline frame has in the recipe, by decimal arithmetic: 31.1 − 30 is exactly 1.1."""
+    """Convert a timeline frame to one of the recipe, where the first of `shown` is 1, without rounding errors."""
     return float(Decimal(str(np.float32(frame))) - (shown.start - 1))

@@ -232,7 +232,7 @@ def _items(converter: Converter, value: Any, kind: Any) -> list | tuple:
 
 
 def _of_field(name: str, message: str) -> Exception:
-    """Return an error about a field of a JSON object, from which `_first_fault` makes the place."""
+    """Return an error about a field of a JSON object, which `_first_fault` turns into a sentence with the place."""
     from cattrs.errors import AttributeValidationNote, ClassValidationError
 
     error = ValueError(message)
@@ -255,7 +255,7 @@ def _dataclass(kind: Any, converter: Converter) -> Callable[[Any, Any], Any]:
 
 
 def _made_of(*origins: Any) -> Callable[[Any], bool]:
-    """Return a function that tells whether a type is made with one of these, such as Literal or list."""
+    """Return a test for types: whether a type is made with one of `origins`, such as Literal or list."""
     return lambda kind: get_origin(kind) in origins
 
 

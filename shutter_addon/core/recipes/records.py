@@ -249,7 +249,7 @@ def _filmed(effect: model.Effect, options: Options) -> model.Effect:
 
 
 def _values(kind: type, record: Any) -> dict[str, Any]:
-    """Return a record's values for the properties of a class, by the names of the model."""
+    """Read the properties of a class of the model from a record: {attribute's name: value}."""
     said = {name: (each, getattr(record, each.recipe)) for name, each in fields_of(kind).items() if each.recipe}
     return {name: _channel(value) if each.is_channel else value for name, (each, value) in said.items()}
 
@@ -260,7 +260,7 @@ def _channel(value: float | list[ValueKey]) -> Channel:
 
 
 def _columns(keys: list, *names: str) -> list[tuple]:
-    """Return for each of the names a tuple with that field of all keys."""
+    """Return a tuple for each name: the values that all keys have in the field of this name."""
     return [tuple(getattr(key, name) for key in keys) for name in names]
 
 
@@ -283,7 +283,7 @@ def _shutter(record: Any, follow: model.Subject | None) -> model.Shutter:
 
 
 def _moves(keys: list, *, drawn: bool = False) -> model.Moves:
-    """Return the placement over time for keys of a record.
+    """Convert the keys of a record to a placement over time.
 
     Args:
         keys: MoveKeys.
@@ -296,7 +296,7 @@ def _moves(keys: list, *, drawn: bool = False) -> model.Moves:
 
 
 def _region(record: Any, shutter: int) -> model.Region | model.MatteRegion:
-    """Return the region of a record, with the index of its shutter."""
+    """Convert a region's record to a region of the model. `shutter` is the index of its shutter."""
     values: dict[str, Any] = _values(record.model, record) | {"shutter": shutter}
     values["moves"] = _moves(record.keys, drawn=isinstance(record, SubjectRecord))
     values |= {name: _drawings(record.name, drawn) for name, drawn in drawn_in(record).items()}
@@ -313,7 +313,7 @@ def _region(record: Any, shutter: int) -> model.Region | model.MatteRegion:
 
 
 def drawn_in(record: Any) -> dict[str, list[Drawing]]:
-    """Return the drawings in a region's record, by the names of the model; none for mattes and ramps.
+    """Return the drawings in a region's record, as lists by the model's attributes; {} for mattes and ramps.
 
     The field `strokes` of a scribble or an outline is its first drawing, unless its first key has strokes.
     """
@@ -423,7 +423,7 @@ def _move_keys(moves: model.Moves) -> list[dict[str, Any]]:
 
 
 def _strokes_of(drawings: model.Drawings) -> dict[float, list[Stroke]]:
-    """Return drawings as lists of strokes, by frame."""
+    """Return drawings as {frame: strokes}, in the form that recipes have."""
     drawn = ([[(x, y) for x, y in stroke.tolist()] for stroke in strokes] for strokes in drawings.strokes)
     return dict(zip(drawings.frames, drawn, strict=True))
 
