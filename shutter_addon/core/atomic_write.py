@@ -33,7 +33,7 @@ def writing(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def part_folder(parent: Path) -> Iterator[Path]:
-    """Yield a new part folder (a temporary folder) in `parent`, and remove it with its content at the end.
+    """Yield a new temporary folder in `parent`, and remove it with its content at the end.
 
     Libraries write files by path. In a new folder, nobody can have placed a link, and no other process writes.
 
@@ -48,7 +48,7 @@ def part_folder(parent: Path) -> Iterator[Path]:
 
 
 def new_part(parent: Path) -> Path:
-    """Make a part folder (a temporary folder) in `parent` and return its path.
+    """Make a temporary folder in `parent` and return its path.
 
     Raises:
         OSError: It cannot be made.
@@ -60,7 +60,7 @@ def new_part(parent: Path) -> Path:
 
 
 def is_part(name: str) -> bool:
-    """Return whether a folder's name is that of a part folder, a temporary folder of this module."""
+    """Return whether a folder's name is that of a temporary folder of this module."""
     return _NAME.fullmatch(name) is not None
 
 

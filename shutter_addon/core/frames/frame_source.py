@@ -148,7 +148,8 @@ class Pair(Protocol):
 
         Args:
             moment: The moment.
-            first, second: The values (H, W) in the first and the second frame."""
+            first, second: The values (H, W) in the first and the second frame.
+        """
 
 
 @dataclass(frozen=True)

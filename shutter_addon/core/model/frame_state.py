@@ -307,7 +307,8 @@ class FrameState:
     def of(self, chosen: Sequence[int]) -> FrameState:
         """Return the state of the chosen shutters (by index) alone, without scribbles, mattes and layers.
 
-        Its Options.edge_aware is 0."""
+        Its Options.edge_aware is 0.
+        """
         return FrameState(
             options=replace(self.options, edge_aware=0.0),
             bars=self.bars[list(chosen)],

@@ -96,7 +96,8 @@ def keys(
 def gaps(seen: Collection[int], stops: Iterable[Stop], beside: int = 0) -> list[Gap]:
     """Return the spans of frames without the subject (gaps), ascending, with adjoining ones merged.
 
-    Arguments as for `keys`."""
+    Arguments as for `keys`.
+    """
     merged: list[Gap] = []
     for each in sorted(_gap(seen, stop) for stop in stops):
         gap = each._replace(first=each.first - beside, last=each.last + beside)

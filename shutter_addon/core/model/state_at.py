@@ -199,7 +199,8 @@ def followed(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameS
 def _with_trails(effect: Effect, state: FrameState, following: Following, clip: Clip, at: Shown) -> np.ndarray:
     """Return the state's bars (N, L), stretched or shortened where a motion sets the exposure's length.
 
-    Trails are open while what they follow moves by their distance; Camera.influence shortens the camera's exposures."""
+    Trails are open while what they follow moves by their distance; Camera.influence shortens the camera's exposures.
+    """
     bars = state.bars.copy()
     positions = windows.positions(state.options, at.source_frame, at.direction)
     shown_at = float(np.abs(positions - at.source_frame).argmin()) + 0.5

@@ -33,7 +33,8 @@ def positions(options: Options, index: int, direction: int = 1) -> np.ndarray:
 def reach(state: FrameState, index: int, direction: int = 1) -> tuple[int, int]:
     """Return the lowest and the highest position, as a frame number of the footage, that any shutter exposes.
 
-    Positions can lie beyond the footage. Arguments as for `positions`."""
+    Positions can lie beyond the footage. Arguments as for `positions`.
+    """
     first = origin(state.options, index, direction)
     ends = [first + direction * place for place in (state.open_span[0], state.open_span[1] - 1)]
     return min(ends), max(ends)
@@ -42,7 +43,8 @@ def reach(state: FrameState, index: int, direction: int = 1) -> tuple[int, int]:
 def origin(options: Options, index: int, direction: int = 1) -> int:
     """Return the position of the window's first frame, as a frame number of the footage, possibly beyond its ends.
 
-    Arguments as for `positions`."""
+    Arguments as for `positions`.
+    """
     return (index if direction > 0 else index + options.step - 1) - direction * options.before
 
 
