@@ -30,7 +30,7 @@ def composition(way: str, groups: int, **macros: int | str) -> Pass:
     """Return a compute pass that composes pictures: compose_<way> of shaders/.
 
     Args:
-        way: As from `way_of`.
+        way: A name from `way_of` or `moved_way`.
         groups: The number of groups of four shutters.
         macros: More macros of the shader. They replace those that this function sets.
     """
@@ -40,11 +40,11 @@ def composition(way: str, groups: int, **macros: int | str) -> Pass:
 
 
 def lines_of(way: str, *, is_median: bool) -> int:
-    """Return how many rows of pixels one invocation of a way's pass composes.
+    """Return how many rows of pixels one shader invocation of a composition pass composes.
 
     Args:
-        way: As from `way_of`.
-        is_median: Whether it makes a median of frames.
+        way: The pass, a name from `way_of`.
+        is_median: Whether the pass makes a median of frames.
     """
     return 4 if is_median else _LINES.get(way, BLOCK)
 
@@ -78,14 +78,18 @@ def way_of(window: Window, state: FrameState, values: np.ndarray, shortened: boo
 
 
 def moved_way(state: FrameState, values: np.ndarray, motions: int, mixed: int, quads: int) -> tuple[str, int]:
-    """Return the way to compose a picture whose shutters follow a motion, and the quads of pixels for each invocation.
+    """Choose the pass that composes a picture whose shutters follow a motion, within the limit of loop iterations.
 
     Args:
         state: The effect.
         values: The table of shutters from moved_tables, without the rows of motions.
-        motions: How many motions each frame is seen by.
+        motions: The number of motions for each frame.
         mixed: How many motions a pixel mixes: MIXED of shaders/include/moved.glsl.
-        quads: The most quads.
+        quads: The most groups of four pixels that one shader invocation may compose.
+
+    Returns:
+        The name of the pass without compose_, and how many groups an invocation composes: `quads`, or 1 if those take
+        too many iterations.
     """
     span = state.open_span
     frames = span[1] - span[0]
@@ -107,9 +111,9 @@ def filled_rows(rows: int) -> float:
 
 
 def knots(values: np.ndarray) -> np.ndarray:
-    """Return the table of shaders/compose_sums.glsl for that of `table`.
+    """Convert the table of shutters from `table` to the table of knots that shaders/compose_sums.glsl reads.
 
-    Its knots are the ends of pieces, after each start that is not the end before.
+    Row 0 has the gains. Each other row is a knot: the end of a piece, or a start that differs from the end before it.
     """
     groups = values.shape[1] // 2
     rows = np.zeros((len(values), 2, groups + 1, 4), np.float32)
@@ -131,8 +135,9 @@ def table(state: FrameState) -> np.ndarray:
 
     Row 0 has the gains. For lightest and darkest, they scale the highest weight to 1 (core.pixels.compositor); by
     value, they are the shutters' mean times. By displacement, there is a row for each piece of the quantiles: starts,
-    ends, then dz, the most by which the shutters' times differ at either, and z at its start. By value, there is a row
-    of weights for each frame of the open span.
+    ends, then dz, the most by which the shutters' times differ at either, and z, the
+    fraction of the exposure (0 to 1), at its start. By value, there is a row of weights for each frame of the open
+    span.
     """
     by_pieces, bars = state.options.interpolation == "displacement", state.bars
     rows = _pieces(bars.tobytes(), bars.dtype, bars.shape) if by_pieces else _bars(state)
@@ -170,7 +175,10 @@ def _gains(state: FrameState) -> np.ndarray:
 
 
 def _bars(state: FrameState) -> np.ndarray:
-    """Return the rows of `table` by value: the weight of each frame of the open span, for each shutter."""
+    """Return the rows of `table` by value: the weight of each frame of the open span, for each shutter.
+
+    A shutter's weights sum to 1; for lightest and darkest, the highest is 1 instead.
+    """
     (combine,) = state.groups
     whole = state.bars.max(axis=1) if combine.mode in ("lightest", "darkest") else state.bars.sum(axis=1)
     return padded((state.bars / whole[:, None]).T[slice(*state.open_span)])
@@ -179,9 +187,10 @@ def _bars(state: FrameState) -> np.ndarray:
 def moved_tables(state: FrameState, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the table of shutters and that of motions for a picture whose shutters follow something.
 
-    Passes read them as in shaders/include/moved.glsl; the caller adds the layers of frames. By displacement there is
-    one motion, which mixes those of the shutters. By value there is one for all shutters that move alike, and the table
-    of shutters has a row for each frame and motion. A row for each motion follows: 1 for its shutters.
+    Passes read them as in shaders/include/moved.glsl; the caller adds in which layer of a texture each frame is. By
+    displacement there is one motion, which mixes those of the shutters. By value there is one for all shutters that
+    move alike, and the table of shutters has a row for each frame and motion. A row for each motion follows: 1 for its
+    shutters.
 
     Args:
         state: The effect.

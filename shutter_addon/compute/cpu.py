@@ -61,7 +61,8 @@ class HostWindow:
         Args:
             indices: (L,) source frames. One that is not loaded is not exposed, and becomes one black pixel.
             tile: The tile's rows and columns.
-            moves: Turns and shifts (L, N) of the picture. None: nothing is followed.
+            moves: (turns, shifts), complex (L, N), for each frame and shutter: a point z of the picture lies in the
+                frame at turn · z + shift. None: nothing is followed.
 
         Returns:
             Frames (h, w, 4) in linear light, premultiplied: the tile's pixels, or all that a following exposure reads;
@@ -94,7 +95,7 @@ def _ends(pixels: slice) -> tuple[int, int]:
 
 
 def _around(places: np.ndarray, source: FrameSource) -> Tile:
-    """Return the rows and columns that are read when a source's frame is sampled between places x + iy."""
+    """Return the rows and columns of a source's frame that cover all places x + iy, with a margin of 3 pixels."""
     sides = (places.imag, source.height), (places.real, source.width)
     rows, columns = (np.clip((along.min() - 3, along.max() + 3), 0, size - 1).astype(int) for along, size in sides)
     return slice(rows[0], rows[1] + 1), slice(columns[0], columns[1] + 1)

@@ -101,7 +101,7 @@ def _solved(labels: np.ndarray, shutters: np.ndarray, across: np.ndarray, down: 
 
 
 def _grid(across: np.ndarray, down: np.ndarray, ground: np.ndarray) -> _Grid:
-    """Return a grid with these conductances, and the inverse of each cell's sum."""
+    """Return a grid with these conductances, and with 1 / the sum of each cell's conductances (0 if the sum is 0)."""
     diagonal = ground.copy()
     for ties, cells in ((across, diagonal), (down.T, diagonal.T)):
         cells[:, :-1] += ties
@@ -113,7 +113,7 @@ def _grid(across: np.ndarray, down: np.ndarray, ground: np.ndarray) -> _Grid:
 def _inflow(across: np.ndarray, down: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Return what flows into each cell (…, h, w) from its neighbors, for the cells' values (…, h, w).
 
-    It sums differences: with a rounded diagonal, some would leak.
+    A flow is a conductance times a difference of values, so what leaves a cell enters another one exactly.
     """
     stopping.check()
     flow = np.zeros_like(values)
@@ -149,7 +149,7 @@ def _cycle(grids: list[_Grid], right: np.ndarray) -> np.ndarray:
 
 
 def _in_twos(values: np.ndarray, axis: int) -> np.ndarray:
-    """Return the sums of pairs of values along an axis. The last one may be single."""
+    """Return the sums of successive pairs of values along an axis. An odd last value stays as it is."""
     along = values.swapaxes(axis, 0)
     total, others = along[::2].copy(order="K"), along[1::2]
     total[: len(others)] += others
@@ -157,7 +157,7 @@ def _in_twos(values: np.ndarray, axis: int) -> np.ndarray:
 
 
 def _in_fours(values: np.ndarray) -> np.ndarray:
-    """Return the sums over 2 × 2 cells of values (…, h, w). The last ones may be of fewer."""
+    """Return the sums over blocks of 2 × 2 cells of values (…, h, w). Blocks at the far edges may have fewer cells."""
     return _in_twos(_in_twos(values, values.ndim - 2), values.ndim - 1)
 
 

@@ -166,10 +166,10 @@ class Diffusion:
         self._grids, self._made_for = [], None
 
     def _prepare(self, shape: tuple[int, ...], count: int) -> bool:
-        """Make the grids for pictures of a size (H, W) and a number of shutters, unless there are such grids.
+        """Make the grids for pictures of a size (H, W) and a number of shutters, unless the present ones suit.
 
         Returns:
-            Whether there were, with the solution of the last solve.
+            True if the present grids suit: they hold the last solution. False if the grids are new.
         """
         height, width = shape
         if self._made_for == (width, height, count):
@@ -244,7 +244,7 @@ class Diffusion:
             self._run(coarsen, coarse, "changed", 16, **to)
 
     def _cycle(self, index: int) -> None:
-        """Run a V-cycle over the grid with a number and all coarser ones, which improves that grid's solution."""
+        """Improve the solution of grid number `index` by a multigrid V-cycle over this grid and all coarser ones."""
         grid, *coarser = self._grids[index : index + 2]
         if not coarser:
             self._solve_coarsest(grid)
@@ -259,7 +259,7 @@ class Diffusion:
         self._smooth(grid, sweeps, back=self.returns)
 
     def _correct(self, index: int) -> None:
-        """Improve the solution of the grid with a number, which then corrects the next finer one."""
+        """Improve the solution of grid number `index`, which corrects the next finer grid, by one or two V-cycles."""
         finer, grid = self._grids[index - 1 : index + 1]
         first_whole = max(grid.size) <= WHOLE and (finer.finest or max(finer.size) > WHOLE)
         for _ in range(1 + first_whole):
@@ -380,7 +380,7 @@ def _codes(rows: int, columns: int, fours: int) -> np.ndarray:
 
     Args:
         rows, columns: The number of tiles.
-        fours: A tile's side; it and x and y count in fours of cells.
+        fours: A tile's side in units of four cells. x and y have the same unit.
     """
     return (fours * (np.arange(columns) + 4096 * np.arange(rows)[:, None])).astype(np.float32)
 
@@ -388,7 +388,7 @@ def _codes(rows: int, columns: int, fours: int) -> np.ndarray:
 def _last_ones(grid: _Grid) -> np.ndarray:
     """Return which tiles (rows, columns) go beyond the last cells of the next coarser grid.
 
-    They are the last ones along a side with an even number of cells.
+    They are the last column if the grid's width in cells is even, and the last row if its height is even.
     """
     width, height = grid.size
     last = np.zeros_like(grid.reached)

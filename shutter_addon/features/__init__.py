@@ -44,21 +44,21 @@ def modules() -> list[ModuleType]:
 
 
 def each(name: str) -> Iterator[Any]:
-    """Yield the attribute with this name of each module of a feature that has one."""
+    """Yield the attribute `name` of each module, in any feature, that has such an attribute."""
     return (getattr(module, name) for module in modules() if hasattr(module, name))
 
 
 def call(name: str, *arguments: Any) -> None:
-    """Call the function with this name in each module of a feature that has one."""
+    """Call the function `name` in each module, in any feature, that has such a function."""
     for function in each(name):
         function(*arguments)
 
 
 def needed(name: str) -> Any:
-    """Return the attribute with this name of the feature that has one.
+    """Return the attribute `name` of the feature module that has it.
 
     Raises:
-        EffectError: None has: the feature was removed.
+        EffectError: No module has it, because the feature was removed.
     """
     for found in each(name):
         return found

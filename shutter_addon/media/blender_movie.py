@@ -50,8 +50,8 @@ class _Decoder:
 class BlenderMovie(FrameSource):
     """A movie whose frames a second Blender decodes.
 
-    8-bit frames equal those of movie.MovieSource to the bit; deeper ones are Blender's floats. In place of damaged
-    frames Blender may show others.
+    8-bit frames equal those of movie.MovieSource to the bit. Deeper ones are Blender's floats, rounded to uint16.
+    Blender may show another frame in place of a damaged one.
     """
 
     decoder = _Decoder()  # all movies share a process: starting one takes seconds
@@ -96,9 +96,9 @@ class BlenderMovie(FrameSource):
 
 
 def frame_rate(number: float) -> Fraction:
-    """Return the exact frame rate for Blender's, which is a float.
+    """Return the exact frame rate, in frames per second, that Blender has rounded to a float.
 
-    It is a whole number, a whole number · 1000/1001, or else the nearest fraction.
+    It is a whole number, a whole number · 1000/1001, or else a near fraction with a denominator of at most 1000.
     """
     for rate in (Fraction(round(number)), Fraction(round(number * 1.001) * 1000, 1001)):
         if rate and abs(float(rate) / number - 1) <= _FLOAT_ERROR:
@@ -107,7 +107,7 @@ def frame_rate(number: float) -> Fraction:
 
 
 def lend(command: list[str] | None) -> None:
-    """Set the command that starts the process, and end a running process.
+    """Set the command that starts the second Blender, which decodes movies, and end the one that runs.
 
     Args:
         command: The command, which gets ANSWER as its last argument. None: movies cannot be decoded this way.
@@ -119,7 +119,7 @@ def lend(command: list[str] | None) -> None:
 
 
 def ask(wanted: dict) -> tuple[dict, np.ndarray | None]:
-    """Ask the process, and return its answer.
+    """Send a question to the second Blender, which decodes movies, and return its answer.
 
     Args:
         wanted: A question, as decoding_process.py describes them.
@@ -138,10 +138,10 @@ def ask(wanted: dict) -> tuple[dict, np.ndarray | None]:
 
 
 def _answer(wanted: dict) -> tuple[dict, np.ndarray | None] | None:
-    """Return the answer of the process, which is started if it does not run; arguments and results as for `ask`.
+    """Ask the second Blender as `ask` does, and start it if it does not run.
 
     Returns:
-        None if the process has ended, or was killed because it did not answer.
+        What `ask` returns; None if the process has ended, or was killed because it did not answer.
     """
     process = BlenderMovie.decoder.process or _started()
     try:
@@ -158,7 +158,7 @@ def _answer(wanted: dict) -> tuple[dict, np.ndarray | None] | None:
 
 @contextmanager
 def _killed_after(seconds: float, process: subprocess.Popen[bytes]) -> Iterator[None]:
-    """Kill the process if this context lasts longer than some seconds. Reading from a pipe has no timeout."""
+    """Run a `with` block, and kill the process if the block takes longer. Reading from a pipe has no timeout."""
     ended = threading.Event()
 
     def watch() -> None:
@@ -207,7 +207,7 @@ def _line(stream: IO[bytes]) -> bytes:
 
 
 def _started() -> subprocess.Popen[bytes]:
-    """Start the process and return it.
+    """Start the second Blender, which decodes movies, and return its process.
 
     Raises:
         MediaError: It cannot be started.
@@ -235,7 +235,7 @@ def _started() -> subprocess.Popen[bytes]:
 
 
 def _end() -> None:
-    """End the process and wait until it is gone; kill it if that takes too long."""
+    """End the second Blender and wait until it is gone; kill it if that takes more than ENDING seconds."""
     process, BlenderMovie.decoder.process = BlenderMovie.decoder.process, None
     if process is not None:
         with _killed_after(ENDING, process), suppress(OSError), process:  # closes its pipes and waits for its end

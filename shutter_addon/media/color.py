@@ -44,7 +44,7 @@ def in_colorspace(source: FrameSource, name: str, config: str | Path | None) -> 
 def keeps(name: str, config: str | Path) -> bool:
     """Return whether 8-bit sRGB colors survive a conversion to a color space and back, within less than a level.
 
-    If the configuration does not have the color space, return True.
+    If the configuration cannot convert to the color space and back, return True.
 
     Args:
         name: Blender's name of the color space.
@@ -98,7 +98,7 @@ class ColorSource(SourceWrapper):
 
 
 def shown(light: np.ndarray) -> np.ndarray:
-    """Return the code values that an sRGB display gets for scene-linear light, float32 of any shape.
+    """Encode scene-linear light as code values for an sRGB display, as Blender does; both float32 of any shape.
 
     Raises:
         RuntimeError: This version of OpenImageIO cannot convert it.
@@ -107,12 +107,15 @@ def shown(light: np.ndarray) -> np.ndarray:
 
 
 def blended(light: np.ndarray) -> np.ndarray:
-    """Return `shown` for light that the sequencer has blended with other strips: it encodes, decodes and encodes it."""
+    """Encode light like `shown`, but with the rounding of strips that Blender's sequencer blends.
+
+    It encodes such light, decodes it and encodes it again.
+    """
     return _transformed(light, (_ENCODE, _DECODE, _ENCODE))
 
 
 def _transformed(light: np.ndarray, paths: tuple[str, ...]) -> np.ndarray:
-    """Return values float32 of any shape, converted by OpenColorIO with files of transforms, one after another."""
+    """Convert values, float32 of any shape, by OpenColorIO with the transform files in `paths`, one after another."""
     samples = np.zeros(-(-light.size // 3) * 3, np.float32)
     samples[: light.size] = light.ravel()
     buffer = ImageBuf(samples.reshape(1, -1, 3))

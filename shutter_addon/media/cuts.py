@@ -51,9 +51,9 @@ def signature(frame: np.ndarray | Planes, transfer: str, alpha: str = "opaque") 
     """Return a small picture of a frame, from which cuts are found.
 
     Args:
-        frame: (H, W, 4), or planes.
-        transfer: The source's.
-        alpha: The source's.
+        frame: RGBA (H, W, 4), or planes of luma and chroma.
+        transfer: How samples are encoded, as in FrameSource.
+        alpha: The alpha mode, as in FrameSource.
 
     Returns:
         Encoded levels 0 … 255, float32 (18, 32, 3), or smaller if the frame is.
@@ -80,7 +80,7 @@ def signature(frame: np.ndarray | Planes, transfer: str, alpha: str = "opaque") 
 
 @lru_cache(8)
 def _blocks(length: int, most: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the starts and lengths of at most `most` blocks of nearly equal size that divide `length` samples."""
+    """Divide `length` samples into at most `most` blocks of nearly equal size, and return their starts and lengths."""
     edges = np.linspace(0, length, min(most, length) + 1).astype(int)
     return edges[:-1], np.diff(edges)
 
@@ -115,21 +115,26 @@ def is_cut(before: list[Signature], after: list[Signature]) -> bool:
 
 
 def may_be_cut(before: Signature, after: Signature) -> bool:
-    """Return whether two successive frames differ enough for a cut between them, by their signatures.
+    """Return whether two frames differ enough for a cut between them, by their signatures (small pictures).
 
-    It is a quick test. `is_cut` also needs the frames around them.
+    This is a quick test. `is_cut` also needs the frames around them.
     """
     return _differ(before, after, NOISE) and _unlike(before, after) >= APART
 
 
 def _parts(picture: Signature) -> list[Signature]:
-    """Return the PARTS × PARTS parts of a frame's small picture."""
+    """Divide a frame's small picture into PARTS × PARTS parts, without empty ones."""
     split = (np.array_split(rows, PARTS, axis=1) for rows in np.array_split(picture, PARTS))
     return [part for parts in split for part in parts if part.size]
 
 
 def _shared(picture: Signature, down: int, right: int) -> Signature:
-    """Return the part of a frame's small picture that another one also shows if the camera jumped by some blocks."""
+    """Return the part of a frame's small picture that another frame also shows if the camera jumped.
+
+    Args:
+        picture: The small picture.
+        down, right: The jump in pixels of the small picture.
+    """
     height, width = picture.shape[:2]
     return picture[max(down, 0) : height + min(down, 0), max(right, 0) : width + min(right, 0)]
 
@@ -160,7 +165,7 @@ def _stands_out(before: list[Signature], after: list[Signature]) -> bool:
 
 
 def _moving(pictures: list[Signature]) -> list[Signature]:
-    """Return those of successive frames' small pictures that do not repeat the last one."""
+    """Return the small pictures of successive frames without those that repeat the one kept before."""
     kept = pictures[:1]
     for picture in pictures[1:]:
         if np.abs(kept[-1] - picture).max() > REPEATED:
@@ -173,7 +178,7 @@ def _moving(pictures: list[Signature]) -> list[Signature]:
 
 
 def _change(before: np.ndarray, after: np.ndarray) -> float:
-    """Return the mean change of brightness (the largest color) between small pictures of two frames, in levels.
+    """Return the mean change of brightness (the largest color) between small pictures of two frames, in levels of 255.
 
     This is the score of PySceneDetect's ContentDetector for luma.
     """
@@ -186,7 +191,7 @@ def _unlike(before: np.ndarray, after: np.ndarray) -> float:
 
 
 def _whole(picture: np.ndarray) -> np.ndarray:
-    """Return a frame's small picture rounded to uint8."""
+    """Return a frame's small picture, rounded and clipped to uint8."""
     return np.rint(picture).clip(0, 255).astype(np.uint8)
 
 
@@ -241,19 +246,23 @@ class ShotSource(SourceWrapper):
         return self
 
     def read(self, index: int) -> np.ndarray:
-        """Return a frame (height, width, 4), as FrameSource.read does. One that waits is not decoded again."""
+        """Return a frame (height, width, 4). One that was read to find cuts is not decoded again."""
         return as_rgba(self.decoded(index))
 
     def decoded(self, index: int) -> Decoded:
-        """Return a frame in its fastest form, as FrameSource.decoded does. One that waits is not decoded again."""
+        """Return a frame in its fastest form (FrameSource.decoded).
+
+        One that was read to find cuts is not decoded again.
+        """
         frame = self._handed.pop(index, None)
         return self._source.decoded(index) if frame is None else frame
 
     def around(self, index: int, low: int, high: int, *, known: bool = False) -> range:
-        """Return the frames of the shot around a frame (ShotFinder.around).
+        """Return the frames of the shot around a frame, between the cuts found in `low` … `high` (ShotFinder.around).
 
-        It reads frames that have no signature yet, in ascending order: those from `low` to the first cut after `index`,
-        and NEIGHBOURS frames on each side of a possible cut.
+        With `known`, only cuts that are known already count, and nothing is read. Otherwise, this reads frames that
+        have no signature yet, in ascending order: those from `low` to the first cut after `index`, and NEIGHBOURS
+        frames on each side of a possible cut.
         """
         if known:
             return self._shot(index, low, high, self._cuts.get)
@@ -263,7 +272,10 @@ class ShotSource(SourceWrapper):
         return shot
 
     def _shot(self, index: int, low: int, high: int, is_cut: Callable[[int], bool | None]) -> range:
-        """Return the frames of the shot around `index`. `is_cut` tells which frames in `low` … `high` follow a cut."""
+        """Return the frames of the shot around `index`, between the cuts in `low` … `high`.
+
+        `is_cut` tells whether a filmed frame, given by its number, follows a cut.
+        """
         first = 0
         for i in self._after(low, high):
             if is_cut(i):
@@ -273,7 +285,7 @@ class ShotSource(SourceWrapper):
         return range(first, self.count)
 
     def lacking(self, index: int, low: int, high: int) -> set[int]:
-        """Return the frames that `around` will read for the same arguments, unless it finds more possible cuts."""
+        """Return the frames that `around` will read for the same arguments, apart from those around possible cuts."""
         stop = min(high + 1, self.around(index, low, high, known=True).stop)
         unknown = [i for i in self._after(low, stop - 1) if i not in self._cuts]
         return {j * self.step for i in unknown for j in (i - 1, i) if j not in self._signatures}
@@ -283,25 +295,25 @@ class ShotSource(SourceWrapper):
         return set(self._handed)
 
     def release(self) -> None:
-        """Free the frames that wait for `read`."""
+        """Free the frames that were read to find cuts and wait for `read`."""
         self._handed = {}
 
     def close(self) -> None:
-        """Close the other source, and free the frames that wait. A later read opens the source again."""
+        """Close the footage's source, and free the frames that wait for `read`. A later read opens it again."""
         self.release()
         self._source.close()
 
     def _after(self, low: int, high: int) -> range:
-        """Return the numbers of filmed frames before which a cut would lie between the frames `low` and `high`."""
+        """Return the numbers of the filmed frames before which a cut between the frames `low` and `high` can lie."""
         first, last = (self._filmed(min(max(i, 0), self.count - 1)) for i in (low, high))
         return range(first + 1, last + 1)
 
     def _filmed(self, index: int) -> int:
-        """Return the number of the filmed frame that is nearest to a frame."""
+        """Return the number of the filmed frame nearest to a frame, which may be a moment between two."""
         return (index + (self.step - 1) // 2) // self.step
 
     def _start(self, filmed: int) -> int:
-        """Return the first frame that belongs to a filmed one, given by its number."""
+        """Return the first of the frames (moments, too) that are nearest to a filmed frame, given by its number."""
         return filmed * self.step - (self.step - 1) // 2
 
     def _is_cut(self, index: int) -> bool:

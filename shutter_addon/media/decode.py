@@ -62,7 +62,7 @@ class FrameReader:
         self._landmarks = _Landmarks()
 
     def first(self) -> tuple[File, av.VideoFrame]:
-        """Return the open file and its first frame.
+        """Open the file again, and return it and its first frame.
 
         Raises:
             MediaError: No frame can be decoded.
@@ -73,9 +73,9 @@ class FrameReader:
         return run.file, run.shown.frame
 
     def frame_at(self, time: float, step: float) -> av.VideoFrame:
-        """Return the frame at a time: the last one before the first later frame, or the first frame.
+        """Return the frame shown at a time: the one before the first later frame, or the file's first frame.
 
-        This is Blender's choice, also where time stamps go back.
+        Blender chooses the same frame, also where time stamps go back.
 
         Args:
             time: In units of time_base.
@@ -94,7 +94,7 @@ class FrameReader:
         return self._find(time, step)
 
     def _find(self, time: float, step: float) -> av.VideoFrame:
-        """Return the frame at a time, as `frame_at` does, with the decoder as it is."""
+        """Return the frame shown at a time, as `frame_at` does, without a second try after an error."""
         run = self._run_at(time, step)
         if run.is_first and run.next is not None and time <= _known(run).time == run.next.time:
             # If several key frames have that time, a seek finds the last one, as in Blender.
@@ -118,7 +118,7 @@ class FrameReader:
         self._container = self._run = None
 
     def _is_near(self, run: _Run, time: float, step: float) -> bool:
-        """Return whether a run gets to the frame at a time, and faster than a seek."""
+        """Return whether decoding on in a run (`_Run`) reaches the frame shown at a time, and faster than a seek."""
         if run.shown is None or time < run.shown.time:
             return run.is_first
         if time <= run.passed:
@@ -126,9 +126,9 @@ class FrameReader:
         return run.next is None or time - run.next.time <= max(KEPT_DECODING, self._landmarks.longest) * step
 
     def _run_at(self, time: float, step: float) -> _Run:
-        """Return a run that will soon reach the frame at a time.
+        """Return a decode (`_Run`) that will soon reach the frame shown at a time.
 
-        It is the last run if that is near, else one that begins with a seek, or at the file's start.
+        It is the last one if that is near, else one that begins with a seek, or at the file's start.
         """
         if (run := self._run) is None:
             return self._restart()
@@ -141,7 +141,7 @@ class FrameReader:
         """Seek to a key frame near the time stamp `start`, and decode from there.
 
         Returns:
-            The run. None if its first frame is damaged or later than `time`.
+            The decode (`_Run`). None: the seek fails, the first frame is later than `time`, or it needs earlier ones.
         """
         try:
             file.container.seek(start, stream=file.stream)
@@ -155,7 +155,7 @@ class FrameReader:
         return run if shown.frame.key_frame or shown.frame.pict_type == PictureType.I else None
 
     def _restart(self) -> _Run:
-        """Open the file again and decode from its start. With an edit list or without an index, a seek would fail."""
+        """Open the file again and decode from its start: a seek there fails with an edit list or without an index."""
         self.close()
         self._container = av.open(str(self._path))
         stream = _video_stream(self._container, self._path.name, self._number)
@@ -164,7 +164,7 @@ class FrameReader:
         return self._begin(File(self._container, stream, _decoder(stream, self._threads)), seeking=False)
 
     def _begin(self, file: File, seeking: bool) -> _Run:
-        """Start a run, in place of the last one. `seeking`: whether it does not begin at the file's start."""
+        """Start a decode in place of the last one. `seeking`: it begins after a seek, not at the file's start."""
         if self._run is not None:
             self._run.close()
             self._run = None
@@ -185,7 +185,7 @@ class _Landmarks:
         self.longest = self._since = 0
 
     def note(self, packet: Packet, from_start: bool) -> None:
-        """Take in the next packet of a run. `from_start`: whether the run began at the file's start."""
+        """Note the next packet of a decode. `from_start`: whether the decode began at the file's start."""
         self._since = 0 if packet.is_keyframe else self._since + 1
         self.longest = max(self.longest, self._since)
         time = time_of(packet)
@@ -200,7 +200,8 @@ class _Landmarks:
 
         Args:
             packet: The key frame's.
-            misleading: Whether only key frames count that a run from the start has seen, as when time stamps go back.
+            misleading: Trust only key frames that a decode from the file's start has seen. This always holds if time
+                stamps were seen to go back.
         """
         return self._seen.get((time_of(packet), packet.size), not (misleading or self._goes_back))
 
@@ -236,17 +237,17 @@ class _Run:
         self.next = next(self._frames, None)
 
     def close(self) -> None:
-        """End the run. It breaks its reference cycle with its generator, which would stay until Python collects it."""
+        """End this decode, so that its memory is freed at once: it and its generator refer to each other."""
         self._frames.close()
 
     def advance(self) -> None:
-        """Go to the next frame."""
+        """Go to the next frame: set `shown` to `next`, and decode the one after it."""
         self.passed = max(self.passed, _known(self).time)
         self.shown, self.is_first = self.next, False
         self.next = next(self._frames, None)
 
     def cut_off(self) -> bool:
-        """Return whether the file ended before the end that its header declares."""
+        """Return whether the file was found to be damaged, or to end before the end that its header declares."""
         container = self.file.container
         if self._broken or not self._ended or container.duration is None:
             return self._broken
@@ -307,9 +308,9 @@ class _Run:
             return []
 
     def _settle(self, time: float) -> None:
-        """Look for frames before a time that the decoder has not given. After an error, they count as lost.
+        """Note frames before a time as lost (`lost`) if the decoder has not given them and there was an error.
 
-        Without an error, they are not meant to be shown.
+        Without an error, frames that are missing are not meant to be shown.
         """
         while self._awaited and self._awaited[0] <= time:
             awaited = heapq.heappop(self._awaited)
@@ -318,7 +319,7 @@ class _Run:
 
 
 def _known(run: _Run) -> _Timed:
-    """Return the frame that a run has reached.
+    """Return the frame that a decode (`_Run.shown`) has reached.
 
     Raises:
         MediaError: There is none, as when the file was replaced.
@@ -329,7 +330,7 @@ def _known(run: _Run) -> _Timed:
 
 
 def time_of(item: Packet | av.VideoFrame) -> int | None:
-    """Return the time stamp of a packet or frame; that of decoding if it has no other, as in AVI files."""
+    """Return the time stamp of a packet or frame; that of decoding if it has no other (AVI). None: it has none."""
     return item.dts if item.pts is None else item.pts
 
 

@@ -37,7 +37,7 @@ _SHAPE = "roi", "roi_full", "channelnames", "format", "channelformats", "deep"
 
 
 def identity(source: FrameSource) -> dict:
-    """Return what tells a source from others, wherever its files lie: their content, and how they are read.
+    """Describe a source by its files' content and how they are read, so that it is known wherever its files lie.
 
     A change in a file larger than WHOLE goes unnoticed if it keeps the size and all blocks that are hashed.
 
@@ -165,7 +165,7 @@ def own_folder(path: Path) -> None:
 
 
 def refuse_link(path: Path) -> None:
-    """Raise OSError if a path is a link, which could lead to files of others."""
+    """Raise OSError if a path is a symbolic link, which could lead to files of other users."""
     if path.is_symlink() or path.is_junction():
         raise OSError(errno.ELOOP, "it is a link, and none is followed")
 
@@ -174,7 +174,7 @@ class StoredVectors:
     """Finds the optical flow between two pictures, or reads it from a folder where it was stored before."""
 
     def __init__(self, folder: Path, writes: bool) -> None:
-        """Use a folder.
+        """Prepare to read and store optical flow vectors in a folder.
 
         Args:
             folder: The folder, which may be missing.
@@ -184,7 +184,7 @@ class StoredVectors:
         self._is_new = True  # nothing was written yet
 
     def found(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """Return the vectors from one grey picture (H, W) uint8 to another and back, as flow.found does."""
+        """Return the optical flow between two grey pictures (H, W) uint8 in both directions, as flow.found does."""
         digest = hashlib.blake2b(f"{flow.VERSION} {first.shape}".encode(), digest_size=16)
         for picture in (first, second):
             digest.update(picture)
@@ -196,7 +196,7 @@ class StoredVectors:
         return values
 
     def _kept(self, path: Path, shape: tuple[int, ...]) -> np.ndarray | None:
-        """Return the stored vectors for pictures of a shape, or None if the file is missing, damaged or another one."""
+        """Read stored vectors for pictures of a shape (H, W). None: the file is missing, damaged or does not fit."""
         height, width = (-(-n // STEP) for n in shape)
         spec = ImageSpec(width, height, len(_CHANNELS), "half")
         spec.channelnames = _CHANNELS
@@ -204,7 +204,7 @@ class StoredVectors:
         return None if values is None or not np.isfinite(values).all() else values
 
     def _keep(self, path: Path, values: np.ndarray) -> None:
-        """Store vectors in a file, if that is wanted. If it fails once, no more are stored."""
+        """Store vectors in a file, unless `writes` is False. After one failure, no more are stored."""
         if not self._writes:
             return
         try:

@@ -27,10 +27,10 @@ def pyav_missing() -> str:
 
 
 def check_file(path: str | Path) -> Path:
-    """Return the path of a readable file that is not empty.
+    """Check that a path is an existing file that is not empty, and return the path.
 
     Raises:
-        MediaError: It is something else, or missing.
+        MediaError: It is missing, empty, a folder, a pipe or a device.
     """
     path = Path(path)
     if path.is_dir():
@@ -45,7 +45,7 @@ def check_file(path: str | Path) -> Path:
 
 
 def stamp(path: str | Path) -> tuple[int, int] | None:
-    """Return a value that changes when a file, or the list of a folder's entries, changes. None: nothing is there."""
+    """Return a file's or folder's time of change and size, to notice when it changes. None: nothing is there."""
     try:
         status = os.stat(path)
     except (OSError, ValueError):  # a name with a null character

@@ -74,7 +74,7 @@ def _write(path: Path, fill: Callable[[OutputContainer], int]) -> None:
 
 
 def _stream(container: OutputContainer, shape: Sequence[int], fps: Fraction) -> VideoStream:
-    """Add the stream of a part to an opened file. `shape` is the pictures' (H, W, …)."""
+    """Add an H.264 video stream to an opened file. `shape` is the pictures' (H, W, …)."""
     stream = container.add_stream("libx264", rate=fps, options=_OPTIONS)
     stream.height, stream.width = shape[:2]
     stream.pix_fmt = "yuv420p" if shape[0] % 2 == shape[1] % 2 == 0 else "yuv444p"  # odd sizes have no halves
@@ -85,7 +85,7 @@ def _stream(container: OutputContainer, shape: Sequence[int], fps: Fraction) -> 
 
 
 def _frame(picture: np.ndarray, stream: VideoStream, index: int) -> VideoFrame:
-    """Return a picture (H, W, 3 or 4) uint8 as the frame of a stream with an index, in the stream's pixel format."""
+    """Convert a picture (H, W, 3 or 4) uint8 to the frame number `index` of a stream, in the stream's pixel format."""
     import av
 
     levels = np.ascontiguousarray(picture[..., :3])

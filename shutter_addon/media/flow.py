@@ -51,9 +51,9 @@ class Between:
         Args:
             first: (height, width, 4), of a FrameSource's dtype.
             second: Like `first`.
-            transfer: How samples are encoded, as in FrameSource. New frames are encoded like these.
-            alpha: Likewise.
-            find: Finds vectors, like `found`. None: `found` itself.
+            transfer: How samples are encoded, as in FrameSource. New frames are encoded in the same way.
+            alpha: The alpha mode, as in FrameSource, of these and new frames.
+            find: Finds the flow, with the arguments and result of `found`. None: `found` itself.
         """
         self.ends, self._transfer, self._alpha = (first, second), transfer, alpha
         self._sides: list[_Carriers] | None = None
@@ -65,7 +65,7 @@ class Between:
             self._sides = sides if _meet(pictures, sides) else None
 
     def with_ends(self, first: np.ndarray, second: np.ndarray) -> Between:
-        """Return a copy for two other frames (H, W, 4), to which the same flow is applied."""
+        """Return a copy that makes moments between two other frames (H, W, 4) by the flow found here."""
         other = copy(self)
         other.ends, other._samples = (first, second), RecentValues()
         other.__dict__.pop("_encoded", None)
@@ -76,10 +76,10 @@ class Between:
         return [_encoded(end, self._transfer, self._alpha) for end in self.ends]
 
     def moment(self, pair: tuple[int, int], number: int, steps: int) -> np.ndarray | Moment:
-        """Return one of the moments between the frames.
+        """Return one of the moments (new frames) between the two frames; `rgba` makes its picture.
 
-        What only one of the two frames shows is taken from it; everything else is mixed. If the frames have nothing in
-        common, it is the nearer frame itself.
+        What only one of the two frames shows is taken from that frame; everything else is mixed. If the frames are
+        equal or have nothing in common, return the nearer frame itself (H, W, 4).
 
         Args:
             pair: The numbers of the two frames, for Moment.pair.
@@ -93,7 +93,7 @@ class Between:
         return Moment(pair, self.ends, number, steps, vectors, levels, self)
 
     def rgba(self, moment: Moment) -> np.ndarray:
-        """Make the frame (H, W, 4) of a moment from `moment`, in the dtype of the two frames."""
+        """Make the picture (H, W, 4) of a Moment that `moment` returned, in the dtype of the two frames."""
         vectors, levels, steps = moment.vectors, moment.levels, moment.steps
         height, width = self.ends[0].shape[:2]
         keys = len(vectors) + 1
@@ -108,7 +108,7 @@ class Between:
         return _decoded(frame, self.ends[0].dtype, self._transfer, self._alpha)
 
     def values(self, moment: Moment, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """Return values (H, W) at a moment, given those of both frames, float32, which move like the frames."""
+        """Move values, such as mattes, like the frames: from both frames' (H, W) float32, return those at a moment."""
         stopping.check()
         (height, width), keys = first.shape, len(moment.vectors) + 1
         key = min(max(round(moment.number * keys / moment.steps), 1), keys - 1)
@@ -151,7 +151,7 @@ def displayed(frame: np.ndarray, transfer: str, alpha: str) -> np.ndarray:
 
 
 def resized(picture: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """Return a picture reduced to this size (width, height), or the picture itself if it has it already."""
+    """Return a picture reduced to a size (width, height), or the picture itself if it has that size already."""
     return picture if picture.shape[1::-1] == size else cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
 
 
@@ -160,7 +160,7 @@ def of_rows(frame: np.ndarray, source: FrameSource, most: int, *, turned: bool =
 
     Args:
         frame: (H, W, 4).
-        source: Its source.
+        source: The source that the frame comes from.
         most: The most rows.
         turned: Swap rows and columns first.
     """
@@ -253,7 +253,7 @@ def _meet(pictures: list[np.ndarray], sides: list[_Carriers]) -> bool:
 
     Args:
         pictures: Grey pictures (H, W) uint8.
-        sides: The vectors from each to the other.
+        sides: The flow vectors from each picture to the other, with their costs.
     """
     brightness = max(float(each.mean()) for each in pictures)
     unlike = max(UNLIKE * min(brightness / GREY, 1.0), NOISE)
@@ -298,12 +298,12 @@ def _paths(sides: list[_Carriers], shape: tuple[int, ...], t: float) -> np.ndarr
 def _carry(
     places: np.ndarray, vectors: np.ndarray, costs: np.ndarray, shape: tuple[int, ...], t: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Carry the vectors from one frame to the other to where they pass at a time.
+    """Move flow vectors to the pixels through which they pass at a time; the cheapest one wins a pixel.
 
     Args:
-        places: See _Carriers, as for `vectors` and `costs`.
-        vectors: Likewise.
-        costs: Likewise.
+        places: Where the vectors start, (2, n), in cells of STEP pixels (_Carriers).
+        vectors: The vectors from one frame to the other, (2, n), in the same unit.
+        costs: Their costs (n,), the highest first.
         shape: The frames' (H, W).
         t: The time, from 0 at the frame where the vectors start to 1 at the other.
 
@@ -329,9 +329,10 @@ def _carry(
 
 
 def _carriers(side: np.ndarray) -> _Carriers:
-    """Return vectors in the form of _Carriers, from one direction of the result of `found`, (h, w, 3).
+    """Sort vectors by cost, the highest first, from one direction of the result of `found`, (h, w, 3), as _Carriers.
 
-    The first one has an infinite cost. It stands for none. Places count from the corner of the margin of `_carry`.
+    The first vector is added. It has an infinite cost and stands for no vector. Places count from the corner of
+    the margin of `_carry`.
     """
     cost = np.ascontiguousarray(side[..., 2]).ravel()
     # As whole numbers, which NumPy sorts ten times as fast; costs are not negative.
@@ -396,8 +397,9 @@ def _late(sure: np.ndarray, key: int, keys: int) -> np.ndarray:
     """Return the weight (H, W) of the second frame at a key moment.
 
     Args:
-        sure: How surely the first and the second frame show what follows the path, (H, W, 2), 0 to 1.
-        key, keys: As in `_mixed`.
+        sure: How surely the first and the second frame show what is at each pixel, (H, W, 2), 0 to 1.
+        key: The key moment's number.
+        keys: Into how many parts key moments divide the time between the frames.
     """
     shown = sure + np.float32(0.05)
     late: np.ndarray = np.float32(key) * shown[..., 1]
@@ -439,7 +441,7 @@ def look(picture: np.ndarray, places: np.ndarray) -> np.ndarray:
 
 @lru_cache(maxsize=2)  # 16 MB at 4K, and a fourth of that
 def grid(height: int, width: int) -> np.ndarray:
-    """Return the places (H, W, 2) of all pixels, x and y in pixels."""
+    """Return the coordinates (H, W, 2) of all pixels of a picture, x and y in pixels, float32."""
     return np.dstack(np.meshgrid(*(np.arange(n, dtype=np.float32) for n in (width, height))))
 
 
@@ -490,13 +492,13 @@ def _table(dtype: np.dtype) -> np.ndarray:
 
 
 def _decoded(frame: np.ndarray, dtype: np.dtype, transfer: str, alpha: str) -> np.ndarray:
-    """Convert linear, premultiplied light (H, W, 3 or 4) to a frame (H, W, 4) as a FrameSource has it.
+    """Encode linear, premultiplied light (H, W, 3 or 4) as a frame (H, W, 4) of a FrameSource.
 
     Args:
         frame: The light.
-        dtype: The source's.
-        transfer: The source's.
-        alpha: The source's.
+        dtype: The frame's dtype.
+        transfer: How the frame's samples are encoded.
+        alpha: The frame's alpha mode.
     """
     convert = light.to_encoded if transfer == "srgb" else np.asarray
     if alpha == "opaque":

@@ -23,7 +23,7 @@ class Footage:
     """
 
     def __init__(self, source: FrameSource, index_at: Callable[[int], int]) -> None:
-        """Take pictures of a source.
+        """Prepare to read small grey pictures of a source.
 
         Args:
             source: The footage.
@@ -40,11 +40,11 @@ class Footage:
         self._wanted: Sequence[int] = ()
 
     def want(self, frames: Sequence[int]) -> None:
-        """Announce the timeline frames whose pictures will be asked for next, in order."""
+        """Announce which timeline frames' pictures will be asked for next, in order, to read them in blocks."""
         self._wanted = frames
 
     def picture(self, frame: int) -> np.ndarray:
-        """Return the picture (H, W) uint8 at a timeline frame.
+        """Return the small grey picture (H, W) uint8 at a timeline frame.
 
         Raises:
             core.stopping.StoppedError: Tracking was cancelled.
@@ -67,9 +67,10 @@ class Footage:
         return shots is not None and low != high and high not in shots.around(low, low, high)
 
     def _read(self, frame: int, index: int) -> None:
-        """Read the source frame `index`, which a timeline frame shows, or a block of frames if tracking goes backward.
+        """Read the picture of a timeline frame, and keep it; if tracking goes backward, those of a block of frames.
 
-        Movies are decoded forward, so a block takes little longer than its first frame.
+        `index` is the source frame that the timeline frame shows. Movies are decoded forward, so a block takes
+        little longer than its first frame.
         """
         before, upcoming = index, list[int]()  # the frame shown before it, and the next ones that are not cached
         if frame in self._wanted:

@@ -25,10 +25,10 @@ class MatteValues:
         """Prepare to read mattes.
 
         Args:
-            width, height: Of the pictures.
+            width, height: Size of the pictures in pixels.
             step: Source frames for each filmed one (Options.step).
-            late: Called with the file and the frame of each matte that is not tracked to this frame yet. What is
-                drawn, joined straight, is used instead. None: such a matte is tracked now, which takes time.
+            late: Called with the file and the frame of each matte that is not tracked to this frame yet. Its outline
+                moves straight from drawing to drawing instead. None: such a matte is tracked now, which takes time.
         """
         self._size, self._step, self._late = (width, height), step, late
         self._sources: dict[SourceFile, FrameSource] = {}
@@ -61,7 +61,7 @@ class MatteValues:
         return list(self._made)
 
     def _content(self, content: Content, index: int) -> tuple[Hashable, Callable[[], np.ndarray]]:
-        """Return a key of a matte's content at a source frame, and a function that reads its values. Open its file."""
+        """Return a key of a matte's content at a frame, equal for equal content, and a function that reads it."""
         if not isinstance(content, FileFrame):
             return content, partial(content.values, *self._size)
         file, late = content.file, self._late

@@ -101,15 +101,15 @@ class MovieSource(FrameSource):
         return as_rgba(self.decoded(index))
 
     def _picture(self, index: int, frame: av.VideoFrame) -> np.ndarray:
-        """Return the RGBA pixels of a decoded frame. The index is for errors."""
+        """Convert a decoded frame to RGBA pixels (H, W, 4). The index is used in the error's message."""
         with self._named(index):
             return self._pixels(frame)
 
     def decoded(self, index: int) -> Decoded:
         """Return the frame as RGBA (H, W, 4), or as planes of luma and chroma if a GPU can convert these.
 
-        Those are 8-bit 4:2:0 planes in BT.601 or BT.709 that need no scaling, rotation or deinterlacing. They are views
-        of the decoder's memory. Converted by their matrix, they equal `read` to the bit.
+        A GPU can convert 8-bit 4:2:0 planes in BT.601 or BT.709 that need no scaling, rotation or deinterlacing. They
+        are views of the decoder's memory. Converted by their matrix, they equal `read` to the bit.
 
         Raises:
             MediaError: The frame cannot be decoded.
@@ -154,7 +154,7 @@ class MovieSource(FrameSource):
             raise MediaError(f"frame {index} of {self.path.name} cannot be decoded: {why}") from error
 
     def _matrix(self, frame: av.VideoFrame) -> Matrix | None:
-        """Return the matrix that converts a frame's planes to RGB, or None if they need more than that."""
+        """Return the matrix that converts a frame's luma and chroma to RGB, or None if a matrix alone is not enough."""
         if frame.format.name not in _PLANAR_420 or self._deinterlace or self._turns:
             return None
         if (frame.width, frame.height) != self._size or self._scaler != SCALER:
@@ -201,9 +201,9 @@ class MovieSource(FrameSource):
 
 
 def _untold(frame: av.VideoFrame) -> av.VideoFrame:
-    """Return a copy of a frame without marks for fields and for the position of chroma, which PyAV cannot clear.
+    """Return a copy of a frame without its marks for interlaced fields and the position of chroma.
 
-    libswscale would heed these marks, and Blender's conversion does not.
+    libswscale would heed these marks, and Blender's conversion does not. PyAV cannot clear them.
     """
     copy = av.VideoFrame(frame.width, frame.height, frame.format.name)
     for own, plane in zip(frame.planes, copy.planes, strict=True):

@@ -11,7 +11,7 @@ __all__ = ["check", "cv2"]
 
 
 def check(what: str, module: str = "") -> None:
-    """Check that OpenCV, and a contributed module of it, can be used. Another add-on may bring one without modules.
+    """Check that OpenCV and, if named, a contributed module of it can be used. Other add-ons' may lack modules.
 
     Args:
         what: The beginning of the message, such as "tracking needs".

@@ -62,7 +62,7 @@ def open_source(
 
 
 def with_proxy(source: FrameSource, path: Path, **how: Any) -> FrameSource:
-    """Return a source that reads the frames of another one from a proxy, or that one itself if the proxy does not fit.
+    """Return a source that reads the footage's frames from a proxy (a small copy), or the footage if that does not fit.
 
     Args:
         source: The footage.
@@ -80,7 +80,7 @@ def with_proxy(source: FrameSource, path: Path, **how: Any) -> FrameSource:
 
 
 def _is_movie(path: Path, files: Sequence[str | Path] | None) -> bool:
-    """Return whether a path is that of a movie: it is not in an image strip's list, and not named as an image."""
+    """Return whether to open a path as a movie: it is not in an image strip's list, and not named as an image."""
     return files is None and path.suffix.lower() not in IMAGE_SUFFIXES
 
 

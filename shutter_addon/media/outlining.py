@@ -65,7 +65,7 @@ def _along(drawn: np.ndarray) -> np.ndarray:
 
 
 def _enclosed(drawn: np.ndarray) -> np.ndarray:
-    """Return GrabCut's labels (h, w) uint8 for a subject inside a lasso, as `_along` does.
+    """Return GrabCut's labels (h, w) uint8 for a subject inside a lasso: what belongs to it for sure, probably, or not.
 
     Args:
         drawn: The pixels that the lasso encloses, (h, w) bool.

@@ -20,7 +20,7 @@ class PrefetchSource(SourceWrapper):
     """
 
     def __init__(self, source: FrameSource, *, planes: bool = False) -> None:
-        """Decode a source ahead.
+        """Prepare to decode a source's frames ahead of time.
 
         Args:
             source: The source.
@@ -96,13 +96,13 @@ class PrefetchSource(SourceWrapper):
         self._source.close()
 
     def _wake(self) -> None:
-        """Start the thread, or tell it that something has changed."""
+        """Start the decoding thread if it does not run, and tell it that something has changed."""
         if self._thread is None:
             self._thread = threads.daemon(self._decode)
         self._changed.notify_all()
 
     def _drop(self) -> None:
-        """Free decoded frames that nobody needs."""
+        """Free decoded frames that are neither announced nor waited for."""
         self._done = {index: frame for index, frame in self._done.items() if not self._is_unwanted(index)}
 
     def _is_unwanted(self, index: int) -> bool:

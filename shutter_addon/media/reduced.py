@@ -17,7 +17,7 @@ STRETCHED = 0.1  # how much a proxy's aspect may differ, since the sides of Blen
 def smaller(source: FrameSource, divisor: int) -> FrameSource:
     """Return a source whose frames are reduced by a factor to each side, by averaging squares of pixels.
 
-    Its last row and column may stand for fewer pixels.
+    Where the size is no multiple of the factor, the last row and column stand for fewer pixels.
 
     Args:
         source: The footage.
@@ -31,7 +31,7 @@ def smaller(source: FrameSource, divisor: int) -> FrameSource:
 
 
 def reduced_size(length: int, divisor: int) -> int:
-    """Return a length in pixels after it was reduced by a factor, rounded up."""
+    """Return the length in pixels of a picture's side after it was reduced by a factor, rounded up."""
     return -(-length // divisor)
 
 
@@ -70,7 +70,7 @@ class ProxySource(SourceWrapper):
     from_proxy = True
 
     def __init__(self, source: FrameSource, proxy: FrameSource) -> None:
-        """Read a proxy in place of a source.
+        """Prepare to read a proxy (a small copy of the footage) in place of a source.
 
         Args:
             source: The footage.
@@ -117,7 +117,7 @@ class ProxySource(SourceWrapper):
 
 
 def fits(proxy: FrameSource, source: FrameSource) -> bool:
-    """Return whether a proxy can replace footage: same length, not turned, both opaque, in bytes or half floats.
+    """Return whether a proxy can replace footage: same length and orientation, both opaque, in bytes or half floats.
 
     Blender's proxies of float images are EXR files named .jpg, with sRGB values. A proxy of another size needs OpenCV.
 

@@ -167,7 +167,7 @@ def _in_window(samples: np.ndarray, spec: ImageSpec, window: Window) -> np.ndarr
 
 
 def sequence_files(path: Path) -> list[Path]:
-    """Return the files of the sequence that starts with a file. Missing numbers are left out.
+    """Return the files of the image sequence that starts with a file, in order. Missing numbers are left out.
 
     Raises:
         MediaError: The file is missing, or its folder cannot be listed.
@@ -176,10 +176,10 @@ def sequence_files(path: Path) -> list[Path]:
 
 
 def _numbered(path: Path) -> tuple[dict[int, Path], Path | None]:
-    """Return the files of the sequence that starts with a file.
+    """Find the files of the image sequence that starts with a file.
 
     Returns:
-        The files by frame, from 0, without missing ones; and the first file after a gap that is too wide, or None.
+        {frame from 0: file}, without missing frames; and the first file after a gap that ends the sequence, or None.
     """
     parts, alike = _frame_number(path)
     if parts is None:
@@ -233,13 +233,13 @@ def _frame_number(path: Path) -> tuple[_Parts | None, list[Path]]:
 
 
 def _numbers(stem: str) -> list[_Parts]:
-    """Return the numbers in a file's stem, the last one first, each with what is before and after it."""
+    """Return the numbers in a file's stem, the last one first, each with the text before and after it."""
     found = [(stem[: n.start()], n[0], stem[n.end() :]) for n in re.finditer(r"[0-9]+", stem)]
     return found[::-1]
 
 
 def by_number(path: Path, *, listed: bool = False) -> Callable[[int], Path] | None:
-    """Return a function of i that gives the file whose number is i higher than a file's, or None without a number.
+    """Return a function of i that gives the path whose number is i higher than that of a file. None: it has no number.
 
     Args:
         path: The file.
@@ -254,7 +254,7 @@ def by_number(path: Path, *, listed: bool = False) -> Callable[[int], Path] | No
 
 
 def _has_alpha(path: Path) -> bool:
-    """Return whether an image file has alpha; False if it cannot be read. It is opened only if it has changed."""
+    """Return whether an image file has alpha; False if it cannot be read. It is opened again only if it has changed."""
     if path.suffix.lower() in WITHOUT_ALPHA:
         return False
     try:
@@ -265,13 +265,13 @@ def _has_alpha(path: Path) -> bool:
 
 @lru_cache(maxsize=1 << 17)  # a sequence of an hour and a half
 def _had_alpha(path: Path, _stamp: tuple[int, int] | None) -> bool:
-    """Return whether an image file has alpha. The result is cached for its stamp."""
+    """Return whether an image file has alpha. The result is cached until its stamp (time and size) changes."""
     with _opened(path) as (_image, _spec, layer):
         return len(layer) in ALPHA
 
 
 def _parts(image: ImageInput) -> Iterator[ImageSpec]:
-    """Yield the header of each part of an image, which is then the part that is read."""
+    """Yield the header of each part of an image, and make it the part that is read."""
     for part in itertools.count():
         if not image.seek_subimage(part, 0):
             return
@@ -325,8 +325,8 @@ def _channel_named(channel: str, image: ImageInput, path: Path) -> Layer:
 def _colour_channels(names: Iterable[str]) -> list[int]:
     """Return the positions of the channels that Blender shows of an EXR, by the names of all its channels.
 
-    They belong to the first layer, and there to no pass or "Combined" before other passes. Without RGB, it is XYZ, then
-    grey.
+    They belong to the first layer, and there to no pass or to "Combined" rather than to other passes. RGB comes before
+    XYZ, and XYZ before grey.
     """
     passes: dict[str, dict[str, int]] = {}
     for position, name in enumerate(names):
@@ -386,7 +386,7 @@ def _dtype(spec: ImageSpec) -> np.dtype:
 
 
 def _samples(image: ImageInput, spec: ImageSpec, layer: list[int], path: Path) -> np.ndarray:
-    """Return the samples (height, width, channels) of an opened image at these positions.
+    """Read the samples (height, width, channels) of some channels of an opened image.
 
     Args:
         image: The image, at the wanted part.
@@ -411,10 +411,10 @@ def _samples(image: ImageInput, spec: ImageSpec, layer: list[int], path: Path) -
 
 
 def _told(text: str, path: Path, otherwise: str) -> str:
-    """Return OpenImageIO's message of an error in a file, for use inside a sentence, or `otherwise` without one."""
+    """Shorten OpenImageIO's error message for use inside a sentence; return `otherwise` if it is empty."""
     return " ".join(text.replace(str(path), path.name).split()).partition(". ")[0] or otherwise
 
 
 def no_channel(path: Path, channel: str, names: Iterable[str]) -> MediaError:
-    """Return the error for a file that lacks a channel. It tells the names that there are."""
+    """Return the error for a file that lacks a channel. Its message lists the channels that the file has."""
     return MediaError(f"{path.name}: has no channel {channel}, but {', '.join(names)}")

@@ -52,13 +52,13 @@ def picture_to_image(strip: Strip, size: tuple[int, int], **moved: float) -> np.
 
 
 def is_invertible(matrix: np.ndarray) -> bool:
-    """Tell whether a matrix (3, 3) has a finite inverse. Not if a strip's scale is 0, or a file holds NaN."""
+    """Tell whether a matrix (3, 3) has a finite inverse. It has none if a strip's scale is 0, or a file holds NaN."""
     with np.errstate(all="ignore"):
         return bool(np.isfinite(matrix).all() and np.isfinite(1 / np.linalg.det(matrix)))
 
 
 def picture_to_region(strip: Strip, size: tuple[int, int], region: Region) -> np.ndarray:
-    """Return the matrix (3, 3) from a strip's picture, in fractions 0 to 1, to pixels of the preview."""
+    """Return the matrix (3, 3) from a strip's picture, in fractions 0 to 1, to pixels of the preview region."""
     return image_to_region(region) @ picture_to_image(strip, size)
 
 

@@ -29,7 +29,7 @@ def named(item: ID) -> list[Path]:
 
 
 def every(item: ID) -> list[Path]:
-    """Return the files as `named` does, but for an image sequence all of its files, in order."""
+    """Return the files as `named` does, but for an image sequence all of its pictures, in order."""
     files = named(item)
     if getattr(item, "is_sequence", False) or getattr(item, "source", "") == "SEQUENCE":
         with suppress(MediaError):
@@ -49,7 +49,7 @@ def absolute(owner: ID | Strip, path: str) -> Path:
 
 
 def relative(path: str) -> str:
-    """Return a path relative to the open .blend file, if it lies on the same drive."""
+    """Return a path relative to the open .blend file, if both lie on the same drive."""
     with suppress(ValueError):
         return bpy.path.relpath(path)
     return path

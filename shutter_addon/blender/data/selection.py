@@ -116,7 +116,7 @@ def _baked_part(scene: Scene, strip: Strip) -> Any:
 
 
 def of_bake(scene: Scene, strip: Strip) -> list:
-    """Return all strips that belong to the same bake as a strip, itself included: effect strips and baked strips."""
+    """Return all strips of the bake that a strip belongs to: effect strips and baked strips, the strip itself too."""
     identity = strip.virtual_shutter_bake.identity
     found = scene.sequence_editor.strips_all if identity else ()
     return [other for other in found if other.virtual_shutter_bake.identity == identity]

@@ -184,7 +184,7 @@ def invalidate(scene: Scene, effect_scene: Scene | None = None) -> None:
 
 
 def invalidate_all(_owner: object = None, _context: Context | None = None) -> None:
-    """Drop the frames that Blender's sequencer keeps of all effects."""
+    """Drop the frames that Blender's sequencer keeps of all effects, so that they are made again."""
     for scene in bpy.data.scenes:
         invalidate(scene)
 

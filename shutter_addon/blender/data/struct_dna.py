@@ -59,8 +59,7 @@ def described() -> dict[str, tuple[int, dict[str, int]]]:
 
     Returns:
         The record's size in bytes, and the offset in bytes of each field, by its declaration. Empty if the layout
-        cannot
-        be read; that is kept, too, because masks are read at every frame.
+        cannot be read. Either answer is kept, because masks are read at every frame.
     """
     try:
         with tempfile.TemporaryDirectory(prefix="virtual_shutter_dna_", ignore_cleanup_errors=True) as folder:

@@ -110,7 +110,7 @@ def _called(prop: Property) -> str:
 
 
 def why_full(effect: PropertyGroup, *, regions: int = 0, shutters: int = 0) -> str | None:
-    """Return why an effect cannot get this many more regions and shutters; None: it can."""
+    """Return why an effect has no room for this many additional regions and shutters; None: it has room."""
     if len(effect.regions) + regions > limits.MAX_REGIONS:
         return rpt_("An effect can have at most {most} regions").format(most=limits.MAX_REGIONS)
     if len(effect.shutters) + shutters > limits.MAX_SHUTTERS:

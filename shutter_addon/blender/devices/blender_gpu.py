@@ -74,7 +74,7 @@ def free(*objects: object) -> None:
 
 
 def free_unused() -> None:
-    """Free what `free` had to postpone. To be called where Blender's GPU can be used."""
+    """Free the textures and shaders that `free` had to postpone. To be called where Blender's GPU can be used."""
     BlenderDevice.unused.clear()
 
 

@@ -38,7 +38,7 @@ def add_effect(scene: Scene, source: Strip) -> tuple[Strip, PropertyGroup]:
         source: The movie, image or clip strip.
 
     Returns:
-        The new effect strip, which lies above the source with its range, transform and crop; and the effect.
+        The new effect strip, which lies above the source and has its range, transform and crop; and the new effect.
 
     Raises:
         MediaError: The source's footage cannot be read.
@@ -115,14 +115,14 @@ def _take(source: Strip) -> FrameSource:
 
 
 def connect(scene: Scene, connected: list[Strip]) -> None:
-    """Connect strips to each other only, so that Blender selects and moves them together."""
+    """Connect strips to each other and to no others, so that Blender selects and moves them together."""
     with selecting(scene, connected):
         bpy.ops.sequencer.connect(toggle=False)
 
 
 @contextmanager
 def selecting(scene: Scene, chosen: list[Strip]) -> Iterator[None]:
-    """Select only these strips within a `with` block, for operators that work on the selection; then restore it."""
+    """Select only the strips `chosen` within a `with` block, for Blender's operators; then restore the selection."""
     selected = ((strip, "select", strip in chosen) for strip in scene.sequence_editor.strips_all)
     with for_a_while(selected), bpy.context.temp_override(sequencer_scene=scene):
         yield
@@ -133,7 +133,8 @@ def copy_look(source: Strip, strip: Strip, *, keys: bool = False) -> None:
 
     Args:
         source: The strip to copy from.
-        keys: Copy their F-curves as well.
+        strip: The strip to copy to.
+        keys: Replace the F-curves of these properties with copies of the source's as well.
     """
     for name in (name for names in LOOK.values() for name in names):
         for (old, prop), (new, _prop) in zip(settings(source, name), settings(strip, name), strict=True):
@@ -145,7 +146,11 @@ def copy_look(source: Strip, strip: Strip, *, keys: bool = False) -> None:
 
 
 def settings(strip: Strip, name: str) -> list[tuple[bpy_struct, str]]:
-    """Return owner and name of each property that LOOK's entry `name` stands for: one, or all of a property group."""
+    """Return (owner, property name) of the strip's property `name` or, if it is a property group, of all in the group.
+
+    Args:
+        name: A property of strips, as listed in LOOK.
+    """
     group = getattr(strip, name)
     if not isinstance(group, bpy_struct):
         return [(strip, name)]
@@ -153,13 +158,13 @@ def settings(strip: Strip, name: str) -> list[tuple[bpy_struct, str]]:
 
 
 def new_footage(level: StripsTopLevel, name: str, files: list[str], channel: int, start: int, is_movie: bool) -> Strip:
-    """Add a strip of footage, and return it.
+    """Add a movie strip or an image strip, and return the strip.
 
     Args:
-        level: The strips of a scene or of a meta strip, to which it is added.
+        level: The strips of a scene or of a meta strip, to which the new one is added.
         files: A movie, or the pictures of an image sequence in order.
         channel: The strip's channel.
-        start: Timeline frame at which it starts.
+        start: Timeline frame at which the strip starts.
         is_movie: Whether `files` is a movie.
     """
     if is_movie:

@@ -21,7 +21,8 @@ def summary(weights: np.ndarray, combine: str = "AVERAGE") -> str:
 
     Args:
         weights: The bars (L,): how much each frame counts.
-        combine: An item of choices.COMBINES. Other than for "AVERAGE", the text says how many frames are combined.
+        combine: How frames are combined, an item of choices.COMBINES. Unless it is "AVERAGE", the text says how many
+            frames are combined instead of the angle.
     """
     if not np.any(weights):
         return iface_("All bars are zero: the shutter never opens")
@@ -74,9 +75,9 @@ def paint(effect: PropertyGroup, index: int, weights: Sequence[float] | np.ndarr
     """Set how many bars a shutter has, and their weights at the current frame.
 
     Args:
-        index: Of the shutter.
+        index: Index of the shutter.
         weights: (L,): how much each frame counts.
-        key: Insert keyframes for them.
+        key: Also insert keyframes for the weights.
     """
     shutter = effect.shutters[index]
     while len(shutter.bars) > len(weights):
@@ -89,10 +90,10 @@ def paint(effect: PropertyGroup, index: int, weights: Sequence[float] | np.ndarr
 
 
 def key_bars(effect: PropertyGroup, index: int) -> None:
-    """Insert keyframes at the current frame for all bars of a shutter, with the values that the picture uses.
+    """Insert keyframes at the current frame for all bars of a shutter, with the weights that the picture uses.
 
     Args:
-        index: Of the shutter.
+        index: Index of the shutter.
     """
     # Between keys, the values of F-curves differ from the bars that the picture uses.
     shutter, scene = effect.shutters[index], effect.id_data
@@ -103,7 +104,7 @@ def key_bars(effect: PropertyGroup, index: int) -> None:
 
 
 def _paths(effect: PropertyGroup, index: int) -> list[str]:
-    """Return the data path, from the scene, of the weight of each of a shutter's bars."""
+    """Return the data paths, relative to the scene, of the weights of a shutter's bars, one for each bar."""
     path = f"{effect.path_from_id()}.shutters[{index}].bars"
     return [f"{path}[{k}].weight" for k in range(len(effect.shutters[index].bars))]
 
@@ -121,16 +122,16 @@ def unkey_bars(effect: PropertyGroup, index: int) -> bool:
 def shown(effect: PropertyGroup, index: int) -> tuple[np.ndarray, list[str]]:
     """Return what the bar editor draws of a shutter at the current frame: bars (L,) and their states (key_state).
 
-    It is kept until something changes.
+    The result is cached until something changes.
     """
     key = effect.scene.session_uid, index, effect.id_data.frame_float
     return revision.until_change("bars", key, lambda: _read(effect, index))
 
 
 def key_state(effect: PropertyGroup, index: int) -> list[str]:
-    """Return for each of a shutter's bars how Blender would color its field: "", "animated", "keyed" or "changed".
+    """Return the animation state of each of a shutter's bars at the current frame, as Blender colors fields by it.
 
-    "changed" is a value that differs from that of its F-curve, and is not keyed yet.
+    It is "" (not animated), "animated", "keyed" (has a keyframe here) or "changed" (differs from its F-curve now).
     """
     scene = effect.id_data
     curves = fcurves.Curves(scene)

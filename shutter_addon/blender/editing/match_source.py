@@ -25,7 +25,7 @@ from . import add_effect
 
 
 def strip_and_source(effect: PropertyGroup) -> list[Strip]:
-    """Return [effect strip, source strip] of an effect; []: one of them is missing."""
+    """Return [effect strip, source strip] of an effect; [] if one of them is missing."""
     shown = strips.with_sources(effect.id_data)
     return next(([each.strip, each.source] for each in shown if each.effect == effect), [])
 
@@ -36,7 +36,7 @@ class Shown(NamedTuple):
     Attributes:
         source: The source strip's name.
         differences: Labels of what `match` would change.
-        lacks_modifiers: Whether the source has modifiers that the effect strip lacks.
+        lacks_modifiers: Whether the source has unmuted modifiers of a type that the effect strip lacks.
         has_effects: Whether strips such as Glow or Speed Control use the source.
     """
 
@@ -47,7 +47,7 @@ class Shown(NamedTuple):
 
 
 def shown(effect: PropertyGroup) -> Shown | None:
-    """Return what panels show about an effect's source, kept until something changes; None: there is none."""
+    """Return what panels show about an effect's source, cached until something changes; None: a strip is missing."""
     return revision.until_change("source", effect.scene.session_uid, lambda: _compare(effect))
 
 
@@ -66,10 +66,10 @@ def _compare(effect: PropertyGroup) -> Shown | None:
 
 
 def match(effect: PropertyGroup) -> Strip | None:
-    """Give the effect strip the look and the range of its source.
+    """Give the effect strip the look (transform, crop, flip, color), its keyframes and the range of its source.
 
     Returns:
-        The neighboring strip that keeps the range smaller than the source's; None: nothing does.
+        The neighboring strip that keeps the range smaller than the source's; None: no strip does.
     """
     scene, (strip, source) = effect.id_data, strip_and_source(effect)
     with scribbles_kept(effect, strip):
@@ -82,9 +82,9 @@ def match(effect: PropertyGroup) -> Strip | None:
 
 
 def _looks(strip: Strip) -> dict[str, str]:
-    """Return the values and keyframes of each part of a strip's look (add_effect.LOOK), to be compared.
+    """Return the values and keyframes of a strip's look as texts, by the names in add_effect.LOOK, to compare strips.
 
-    They are texts, because NaN never equals NaN.
+    Texts are compared and not numbers, because NaN never equals NaN.
     """
     path = f"{strip.path_from_id()}."
     curves = [curve for curve in fcurves.curves_under(strip.id_data, path) if not curve.mute]
@@ -109,10 +109,10 @@ def _keyed(curves: list[FCurve], path: str) -> list:
 
 
 def _goal(effect: PropertyGroup, strip: Strip, source: Strip) -> tuple[int, int, Strip | None]:
-    """Return the handles that `match` would give an effect strip, and the neighboring strip that limits them, or None.
+    """Return the left and right handle that `match` would give an effect strip, and the strip that limits them or None.
 
-    They are those of the source, or of all parts that it was cut into below the strip. Where another effect strip uses
-    the same source beyond an edge, that edge stays. Without any room, both stay.
+    The handles are those of the source, or of all parts of the cut source that lie below the strip. Where another
+    effect strip uses the same source beyond an edge, that edge stays. Without any room, both stay.
     """
     parts = (s for s in effect.id_data.sequence_editor.strips_all if s.virtual_shutter_source == effect.source)
     parts = (s for s in parts if s.type == source.type and strips.origin(s) == strips.origin(source))
@@ -133,10 +133,10 @@ def _goal(effect: PropertyGroup, strip: Strip, source: Strip) -> tuple[int, int,
 
 
 def _slip(scene: Scene, strip: Strip, source: Strip, left: int, right: int) -> None:
-    """Slip the content and the keyframes of an effect strip together with its source.
+    """Slip the content and the keyframes of an effect strip to where its source's content begins, if necessary.
 
-    This is done if the source moved as a whole, or begins before the effect's content. An effect strip would show only
-    its first frame before its content begins.
+    It is necessary if the source moved as a whole, or begins before the effect's content. An effect strip would show
+    only its first frame before its content begins.
 
     Args:
         left: Left handle that the strip will get.
@@ -160,7 +160,7 @@ def scribbles_kept(effect: PropertyGroup, strip: Strip) -> Iterator[None]:
 def places(effect: PropertyGroup, strip: Strip) -> list[np.ndarray | None]:
     """Return, for each drawing of an effect, the matrix (3, 3) from the sequencer's image to the picture at its frame.
 
-    None in place of a matrix: the picture is too small there, or its transform is not finite.
+    It is None where the picture is too small, or where its transform is not finite.
     """
     frames = [drawing.frame_number for drawing in _drawings(effect)]
     placement = sampled.Sampling.of(effect.id_data, effect, strip, frames).placement
@@ -172,7 +172,7 @@ def put_back(effect: PropertyGroup, strip: Strip, before: list[np.ndarray | None
     """Move an effect's strokes so that they are where they were on the picture, after the picture was moved.
 
     Args:
-        before: What `places` returned before that.
+        before: What `places` returned before the picture was moved.
     """
     for drawing, old, new in zip(_drawings(effect), before, places(effect, strip), strict=True):
         if old is not None and new is not None and not np.array_equal(old, new):
@@ -201,6 +201,6 @@ def append_modifiers(scene: Scene, source: Strip, part: Strip) -> None:
 
 
 def effects_on(scene: Scene, source: Strip) -> list[Strip]:
-    """Return the strips, such as Glow, that have a source as input. Our engine does not see their result."""
+    """Return the strips, such as Glow, whose input is the strip `source`. Our engine does not see their result."""
     inputs = ("input_1", "input_2")
     return [s for s in scene.sequence_editor.strips_all if any(getattr(s, name, None) == source for name in inputs)]

@@ -53,13 +53,13 @@ class MotionKeys:
     motion: str
 
     def edited(self, frames: range) -> list[int]:
-        """Return those of these frames that have a keyframe of the user's, ascending."""
+        """Return which of some frames have a keyframe that the user made or changed, ascending."""
         keys = map(_read, self._curves(_COUNTS[self.motion]))
         keyed = {frame for all_frames, made in keys for frame in all_frames[~made].tolist()}
         return sorted(int(frame) for frame in keyed if frame in frames)
 
     def are_made(self) -> bool:
-        """Tell whether tracking made any keyframe of the location."""
+        """Tell whether any keyframe of the location was made by tracking and not changed by the user since."""
         curve = self._curve("location")
         return curve is not None and bool(_read(curve)[1].any())
 
@@ -74,20 +74,20 @@ class MotionKeys:
         return are_several and (not len(tracked) or frame in tracked)
 
     def channels(self) -> list[str]:
-        """Return the names of the properties to key: those of `motion`, and others that have keyframes already."""
+        """Return the names of the properties to key: those that `motion` names, and those that have F-curves."""
         count = _COUNTS[self.motion]
         names = (name for k, (name, component) in enumerate(_COMPONENTS) if k < count or self._curve(name, component))
         return list(dict.fromkeys(names))
 
     def hold(self, first: int, last: int) -> None:
-        """Insert keyframes right before and right after some frames where tracking had found positions, with these.
+        """Insert keyframes right before and after a range of frames, with the motion that tracking had found there.
 
-        So changes of the keyframes between do not move what is outside. Positions are as tracking found them, even if
-        the user has changed the first or the last keyframe since.
+        So changes within the range do not move what is outside. A frame that was not tracked or has a keyframe gets
+        none. Values are as tracking found them, even if the user has changed the keyframes at the range's ends since.
 
         Args:
-            first: First of the frames that will change.
-            last: Last of them.
+            first: First frame of the range, which will change.
+            last: Last frame of the range.
         """
         tracked = self.confidence()[0]
         beside = tracked[np.isin(tracked, (first - 1, last + 1))].tolist()
@@ -98,7 +98,7 @@ class MotionKeys:
     def begin(self, frame: int) -> None:
         """Insert a keyframe of the user's at the scene's current frame, from which tracking will start.
 
-        What tracking had found right before and after stays (`hold`).
+        The motion that tracking had found right before and after the frame stays (`hold`).
 
         Raises:
             EffectError: As in check_curves.
@@ -107,13 +107,14 @@ class MotionKeys:
         insert(self.effect, self.index, self.channels(), begins=True)
 
     def write(self, placements: Mapping[int, Placement], confidence: Mapping[int, float]) -> None:
-        """Replace the keyframes that tracking made, at the frames that were tracked now.
+        """Replace the generated keyframes at the frames that tracking has just tracked, and store its confidence.
 
-        Other tracked frames stay. Frames between them that were never tracked get a confidence of 0.
+        Frames tracked earlier and the user's keyframes stay. Frames in between that were never tracked get a
+        confidence of 0.
 
         Args:
             placements: Location, rotation and scale for each new keyframe, at some of the tracked frames.
-            confidence: How sure tracking is, 0 to 1, for all tracked frames.
+            confidence: How sure tracking is, 0 to 1, by frame, for all frames just tracked.
         """
         for first, last in frame_ranges.runs(confidence):
             self.hold(first, last)
@@ -128,7 +129,7 @@ class MotionKeys:
         _replace(self._curve("confidence", new=True), every, every)
 
     def needed(self, shape: Region | Camera, start: int, placements: Placements, kept: Collection[int]) -> list[int]:
-        """Return the frames whose keyframes reproduce a tracked motion within a pixel, or _STEADY for the camera.
+        """Return the few frames whose keyframes reproduce a tracked motion within a pixel (camera: _STEADY pixels).
 
         Args:
             shape: The region or camera as plain data; the motion is compared at its strokes, or at the picture's
@@ -149,9 +150,9 @@ class MotionKeys:
         return points[:, 0], points[:, 1] / 100
 
     def fade(self, name: str, keys: Iterable[presence.Key]) -> None:
-        """Replace the keyframes that tracking made to fade the opacity or influence out where the track ends.
+        """Replace the generated keyframes that fade the opacity or influence out where the track ends.
 
-        Where tracking makes no keyframe, the value is the user's.
+        The user's keyframes stay. If no keyframes are left, the property gets the user's value back.
 
         Args:
             name: Property from 0 to 1, one of ENDS.
@@ -209,13 +210,15 @@ def check_curves(effect: PropertyGroup, index: int | None) -> None:
 
 
 def insert(effect: PropertyGroup, index: int | None, names: Sequence[str] = CHANNELS, *, begins: bool = False) -> None:
-    """Insert keyframes of the user's for a region or the camera at the scene's current frame. Their confidence is full.
+    """Insert keyframes that count as the user's for the motion of a region or the camera, at the scene's current frame.
+
+    If the frame was tracked, its confidence becomes full.
 
     Args:
         index: Of the region; None: the camera.
         names: Properties to key.
         begins: Tracking will start here, so the keyframes lie on a frame that can be tracked. Otherwise, on a stretched
-            timeline, they lie where Blender's own would. They then store what tracking had found, for MotionKeys.hold.
+            timeline, they lie where Blender's own would, and store the values that tracking had found.
 
     Raises:
         EffectError: As in check_curves.
@@ -248,7 +251,10 @@ def _keys_at(curve: fcurves.Timed, frame: float) -> list:
 
 
 def _tracked_value(curve: fcurves.Timed, frame: float) -> float:
-    """Return the value that tracking had found at a frame. A user's keyframe that is inserted there stores it."""
+    """Return the value that tracking had found at a frame, to be stored in a user's keyframe that is inserted there.
+
+    It is NOTHING_KEPT if none is known.
+    """
     for key in _keys_at(curve, frame):
         if key.type != MADE:
             return key.back
@@ -256,11 +262,11 @@ def _tracked_value(curve: fcurves.Timed, frame: float) -> float:
 
 
 def _as_tracked(curve: fcurves.Timed, edited: tuple[int, int], frames: list[float]) -> dict[float, float]:
-    """Return the values that tracking had found at some frames without a keyframe, interpolated linearly.
+    """Return, by frame, the values that tracking had found at some frames without a keyframe, interpolated linearly.
 
     Args:
-        edited: Two frames whose keyframes may be the user's. What tracking had found there is used, then removed from
-            them.
+        edited: Two frames whose keyframes may be the user's. The values of tracking that these store are used,
+            and removed from the keyframes.
         frames: The frames to return values for; those with a keyframe are left out.
     """
     points = curve.points()
@@ -273,7 +279,7 @@ def _as_tracked(curve: fcurves.Timed, edited: tuple[int, int], frames: list[floa
 
 
 def _values(placement: Placement) -> tuple[float, ...]:
-    """Return a placement's numbers in the order of _COMPONENTS, rotation in radians, rounded to _DIGITS digits."""
+    """Return a placement as rounded numbers (x, y, rotation in radians, scale), the order of _COMPONENTS."""
     x, y, rotation, scale = np.round(motions.as_array([placement])[0], _DIGITS).tolist()
     return x, y, math.radians(rotation), scale
 
@@ -306,7 +312,7 @@ def _insert(curve: fcurves.Timed, frame: float, value: float, ease: str = "LINEA
 
 
 def _read(curve: fcurves.Timed) -> tuple[np.ndarray, np.ndarray]:
-    """Return an F-curve's keyframes: their frames (n,), and whether tracking made each and nobody changed it (n,)."""
+    """Return the frames of an F-curve's keyframes (n,), and whether each is tracking's and unchanged since (n,)."""
     points = curve.points()
     types = fcurves.numbers(curve.keyframe_points, "type", np.int32)
     kept = fcurves.numbers(curve.keyframe_points, "back")

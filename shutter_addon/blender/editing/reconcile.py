@@ -35,9 +35,9 @@ _OF_EDIT = "fps", "fps_base", "use_multiview"
 
 
 def update(updated: Scene | None = None) -> None:
-    """Do all that this module does after a change of the edit, and have frames of changed effects made again.
+    """Make effects fit the strips after a change of the edit, and drop cached frames of changed effects.
 
-    Data of a newer version is not changed.
+    Do nothing while a render job runs. Data of a newer version of the extension is not changed.
 
     Args:
         updated: Scene whose depsgraph is being updated, which must not be removed now.
@@ -53,7 +53,7 @@ def update(updated: Scene | None = None) -> None:
 
 
 def tidy(updated: Scene | None = None) -> list[strips.Shown]:
-    """Do all but follow_sources, which reads footage.
+    """Make effects fit the strips, as `update` does, but read no footage (follow_sources) and drop no frames.
 
     Args:
         updated: Scene whose depsgraph is being updated, which must not be removed now.
@@ -81,12 +81,12 @@ def tidy(updated: Scene | None = None) -> list[strips.Shown]:
 
 
 def gather() -> list[strips.Shown]:
-    """Return all effects that strips show, in scenes that can be changed, with strip and source."""
+    """Return all effects that strips show in local scenes (not linked from other files), each with strip and source."""
     return [each for scene in strips.local_scenes() for each in strips.shown_effects(scene)]
 
 
 def forget() -> None:
-    """Forget what is kept of a file's annotations and footage, before another file is loaded."""
+    """Forget the open file's footage, annotations in previews and copied effect, before another file is loaded."""
     _header.cache_clear()
     shown_annotations.forget()
     undelete.forget_copy()
@@ -105,7 +105,7 @@ def find_lost() -> None:
 
 
 def _find_action(scene: Scene) -> None:
-    """Restore a scene's pointer to its action, by the slot that it used.
+    """Restore a scene's lost pointer to its action: find the unused action that has the slot that the scene used.
 
     A scene whose action the user removed has no slot handle, and is left alone.
     """
@@ -167,7 +167,7 @@ def _oldest_first(scenes: list[Scene]) -> list[Scene]:
 
 
 def _separate(scenes: list[Scene]) -> None:
-    """Give copied edits an action of their own. Blender lets a copy share the original's."""
+    """Give copied scenes with effects an action (F-curves) of their own. Blender lets a copy share the original's."""
     taken = set()
     for animation in [scene.animation_data for scene in scenes if scene.virtual_shutter.effects]:
         if animation and animation.action:
@@ -232,7 +232,7 @@ def _duplicate(effect: PropertyGroup, strip: Strip, effect_scene: Scene) -> None
 
 
 def _remove_effects(scene: Scene) -> None:
-    """Remove effects of a scene that no strip shows any more. They are kept for undelete.restore."""
+    """Remove effects of a scene that no strip shows any more. Keep their data in memory for undelete.restore."""
     group, shown = scene.virtual_shutter, {strip.scene for strip in strips.effect_strips(scene)}
     gone = [i for i, effect in enumerate(group.effects) if effect.scene not in shown]
     if gone:
@@ -320,7 +320,10 @@ def _move_drawings(effect: PropertyGroup, start: float) -> None:
 
 
 def _part_sources(shown: list[strips.Shown]) -> None:
-    """Give source strips identities of their own where effects use different ones with the same: copies, cut parts."""
+    """Give source strips that share an identity, as copies and cut parts do, identities of their own.
+
+    This is done where effects use different strips with the same identity.
+    """
     first: dict[tuple[Scene, str], Strip] = {}
     for effect, strip, source in shown:
         if source and first.setdefault((strip.id_data, effect.source), source) != source:
@@ -328,7 +331,7 @@ def _part_sources(shown: list[strips.Shown]) -> None:
 
 
 def _unmute_sources(scenes: list[Scene], shown: list[strips.Shown]) -> None:
-    """Unmute sources that were muted for an effect and that no effect strip uses any more."""
+    """Unmute sources that were muted for an effect, which no effect strip uses and no baked strip covers any more."""
     sources = {each.source for each in shown}
     for strip in [strip for scene in scenes for strip in strips.all_strips(scene) if strip.virtual_shutter_muted]:
         if strip not in sources and not _is_baked_over(strip):
@@ -336,7 +339,10 @@ def _unmute_sources(scenes: list[Scene], shown: list[strips.Shown]) -> None:
 
 
 def _is_baked_over(source: Strip) -> bool:
-    """Tell whether a baked strip lies above a source, which would show through its transparent parts."""
+    """Tell whether a strip with a baked (rendered) effect lies above a source.
+
+    The source would show through transparent parts of the baked strip.
+    """
     baked = (s for s in source.connections if s.type in strips.SOURCES and s.channel > source.channel)
     return any(s.virtual_shutter_bake.identity and strips.overlap(s, source) for s in baked)
 
@@ -377,7 +383,7 @@ def _remove_scenes(updated: Scene | None) -> None:
 
 
 def _remove_left() -> None:
-    """Remove annotations and cameras of removed effects. Those that something else uses become the user's own."""
+    """Remove annotations and cameras of removed effects. Mark those that something else uses as the user's own."""
     scenes = _effect_scenes()
     used = {scene.annotation for scene in scenes} | {scene.camera.data for scene in scenes if scene.camera}
     identities = {scene.virtual_shutter.identity for scene in bpy.data.scenes}

@@ -29,12 +29,12 @@ def add_region(
 ) -> PropertyGroup:
     """Add a region at the end of the list, make it active and return it.
 
-    It gets an annotation layer for strokes, unless it is a matte or ramp.
+    The region gets an annotation layer for strokes, unless it is a matte or ramp.
 
     Args:
-        shutter: The shutter that holds in the region.
+        shutter: The shutter that exposes the region.
         kind: An item of choices.KINDS.
-        name: "": the shutter's. A number makes it unique.
+        name: The region's name, made unique by a number; "": the shutter's name.
         values: Further values of its properties, by name.
     """
     region = effect.regions.add()
@@ -49,10 +49,10 @@ def add_region(
 
 
 def first_drawn(effect: PropertyGroup, shutter: PropertyGroup, kind: str) -> PropertyGroup:
-    """Return a region for new strokes: the shutter's active one if nothing is drawn in it, otherwise a new one.
+    """Return a region for new strokes: the active one if it is empty and uses this shutter, otherwise a new one.
 
-    The first region of a sharp shutter turns *Follow Edges* on, because it usually marks a subject, not a spot, unless
-    the user has set that. It becomes a subject if the model finds one under its first stroke.
+    An effect's first region, if its shutter is sharp (one open frame), usually marks a subject, not a spot. It turns
+    *Follow Edges* on unless the user has set that, and becomes a subject if one is found under its first stroke.
 
     Args:
         kind: An item of choices.KINDS that the region gets.
@@ -80,7 +80,9 @@ def _undrawn(effect: PropertyGroup, shutter: PropertyGroup) -> PropertyGroup | N
 
 
 def new_layer(effect: PropertyGroup, region: PropertyGroup, name: str = "layer") -> AnnotationLayer:
-    """Give a region an empty annotation layer with its name and its shutter's color, and return that.
+    """Give a region an empty annotation layer, and return the layer.
+
+    The layer has the region's name and its shutter's color, or the color NOT_THIS if it is the "not_layer".
 
     Args:
         name: Which of the region's layers, one of annotations.LAYERS.
@@ -94,11 +96,11 @@ def new_layer(effect: PropertyGroup, region: PropertyGroup, name: str = "layer")
 def draw_curves(
     effect: PropertyGroup, strip: Strip, region: PropertyGroup, curves: Curves | Sequence[np.ndarray], frame: int
 ) -> None:
-    """Make curves the drawing of a region at a timeline frame, in place of any that it has there.
+    """Make curves the drawing of a region at a timeline frame, in place of any that the region has there.
 
     Args:
-        strip: The effect strip, whose transform places them in the sequencer's image.
-        curves: Points (n, 2) of each, in fractions of the picture.
+        strip: The effect strip, whose transform places the curves in the sequencer's image.
+        curves: Points (n, 2) of each curve, in fractions of the picture.
 
     Raises:
         EffectError: The strip has a scale of 0.
@@ -139,7 +141,7 @@ def move(effect: PropertyGroup, kind: str, index: int, to: int) -> None:
 
     Args:
         kind: "shutter" or "region".
-        index: Its index.
+        index: Index of the shutter or region.
         to: Its new index.
     """
     fcurves.move_item(effect, f"{kind}s", index, to)
@@ -147,7 +149,7 @@ def move(effect: PropertyGroup, kind: str, index: int, to: int) -> None:
 
 
 def assign_region(effect: PropertyGroup, index: int, shutter: PropertyGroup) -> None:
-    """Make the region with this index use another shutter, which becomes active."""
+    """Make the region with this index use another shutter, and make both active."""
     effect.regions[index].shutter = shutter.name
     color_layers(effect, shutter)
     effect.active_region = index
@@ -157,10 +159,11 @@ def assign_region(effect: PropertyGroup, index: int, shutter: PropertyGroup) -> 
 def hold_drawings(effect: PropertyGroup, index: int) -> None:
     """Note for each drawing of a region where the region was when it was drawn, unless that is noted already.
 
-    Call it before the region is moved: the strokes then move along. It does nothing for mattes (strips.LAID).
+    Call this before the region is moved: its strokes then move along. Do nothing for mattes, ramps, outlines and
+    subjects (strips.LAID).
 
     Args:
-        index: Of the region.
+        index: Index of the region.
     """
     region = effect.regions[index]
     if region.kind not in strips.LAID:
@@ -171,7 +174,7 @@ def begin_drawing(effect: PropertyGroup, strip: Strip, index: int, *, erases: bo
     """Prepare a region's drawing at the current frame for the pen, so that strokes appear where they are drawn.
 
     A drawing made at this frame before its region moved is first stored where it appears now. The eraser also needs the
-    strokes that are shown here from another frame's drawing, so these are stored at this frame.
+    strokes that are shown here from another frame's drawing, so a copy of these is stored at this frame.
 
     Args:
         index: Of the region.

@@ -18,7 +18,10 @@ from ..rendering import previews
 
 
 def follow() -> None:
-    """Give open previews the annotation of the effect that they show at the playhead, in place of another effect's."""
+    """Give open previews the annotation of the effect that they show at the playhead, and show it only to the pen.
+
+    Replace another effect's annotation, but never the user's own.
+    """
     for window in bpy.data.window_managers[0].windows:
         seen = selection.seen(window.workspace.sequencer_scene or window.scene)
         for area in window.screen.areas:
@@ -35,10 +38,12 @@ def is_laid_wrong(space: SpaceSequenceEditor) -> bool:
 
 
 def is_other(space: SpaceSequenceEditor, seen: tuple | None) -> bool:
-    """Tell whether a preview has to get another annotation.
+    """Tell whether a preview has to get another annotation: it has that of an effect that it does not show.
+
+    A preview without one needs one only if its effect's was taken away before.
 
     Args:
-        seen: What selection.seen returns for its scene.
+        seen: What selection.seen returns for the preview's scene: the visible effect; None: no effect is visible.
     """
     wanted = seen[1].scene.annotation if seen else None
     if space.annotation is None:
@@ -52,7 +57,7 @@ def is_own(made: ID) -> bool:
 
 
 def give(space: SpaceSequenceEditor, annotation: Annotation | None) -> None:
-    """Give a preview an effect's annotation; None: take it away until an effect is visible again."""
+    """Give a preview an effect's annotation; None: take its annotation away until an effect is visible again."""
     before = space.annotation
     if before is not None and annotation is not None and not is_own(before):
         before.use_fake_user = True  # keeps the user's annotation in the file
@@ -63,7 +68,7 @@ def give(space: SpaceSequenceEditor, annotation: Annotation | None) -> None:
 
 
 def let_go(annotation: ID) -> None:
-    """Take an annotation away from all previews, before it is removed."""
+    """Take an annotation away from all previews, before the annotation is removed from the file."""
     for space in _spaces():
         if space.annotation == annotation:
             give(space, None)
@@ -77,7 +82,7 @@ def before_undo(*_: object) -> None:
 
 
 def forget() -> None:
-    """Forget what is known of previews, before another file is loaded."""
+    """Forget from which previews annotations were taken away, before another file is loaded."""
     previews.looking.emptied.clear()
 
 

@@ -44,7 +44,7 @@ def add_shutter(effect: PropertyGroup, name: str = "", preset: str = "ANGLE_360"
     """Add a shutter with the bars of a preset at the end of the list, make it active and return it.
 
     Args:
-        name: "": "Shutter". A number makes it unique.
+        name: The shutter's name, made unique by a number; "": "Shutter".
         preset: A key of shutters.PRESETS.
 
     Raises:
@@ -76,17 +76,19 @@ def apply_preset(effect: PropertyGroup, index: int, preset: str, key: bool = Fal
 
 
 def _free_color(effect: PropertyGroup) -> tuple[float, float, float]:
-    """Return the first of COLORS that no shutter has. If all are taken, they repeat."""
+    """Return an RGB color for a new shutter: the first of COLORS that no shutter has. If all are taken, they repeat."""
     used = np.array([shutter.color for shutter in effect.shutters]).reshape(-1, 3)
     free = [color for color in COLORS if not np.isclose(used, color, atol=1e-3).all(axis=1).any()]
     return free[0] if free else COLORS[len(used) % len(COLORS)]
 
 
 def duplicate_shutter(effect: PropertyGroup, index: int) -> PropertyGroup:
-    """Add a copy of a shutter, with its keyframes, right after it, and return that. Its regions stay with the original.
+    """Add a copy of a shutter, with its keyframes, right after it, and return the copy.
+
+    Regions stay with the original.
 
     Args:
-        index: Of the shutter.
+        index: Index of the shutter.
     """
     scene, path, color = effect.id_data, f"{effect.path_from_id()}.shutters", _free_color(effect)
     last, new = len(effect.shutters), effect.shutters.add()
@@ -128,10 +130,10 @@ def ramp_between(
     The first shutter becomes the default.
 
     Args:
-        first: Its name and a preset.
-        last: Name and a preset of the second shutter.
-        name: Of the ramp.
-        ramp: An item of choices.RAMPS.
+        first: Name and preset (a key of shutters.PRESETS) of the first shutter.
+        last: Name and preset of the second shutter.
+        name: Name of the ramp.
+        ramp: The ramp's direction or kind, an item of choices.RAMPS.
     """
     add_shutter(effect, *first)
     move(effect, "shutter", effect.active_shutter, 0)
@@ -141,10 +143,10 @@ def ramp_between(
 def as_layer(effect: PropertyGroup, index: int, own: str, rest: str, key: bool = False) -> None:
     """Make a region a layer in front of the rest of the picture, exposed by a shutter that it alone uses.
 
-    Neither that shutter nor the default one, which exposes the rest, follows anything afterwards.
+    That shutter and the default one, which exposes the rest, no longer follow a motion, and the window is centered.
 
     Args:
-        index: Of the region.
+        index: Index of the region.
         own: Preset of the layer's shutter.
         rest: Preset of the default shutter.
         key: Insert keyframes for the bars.

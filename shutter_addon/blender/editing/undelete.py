@@ -24,14 +24,18 @@ _effects: RecentValues[str, dict] = RecentValues()
 def keep(effect: PropertyGroup) -> None:
     """Keep in memory an effect that is about to be removed: properties, F-curves and annotation.
 
-    It can be restored by the identity of its effect scene.
+    `restore` makes it again by the identity (unique text) of its effect scene. Without an identity, keep nothing.
     """
     if effect.scene is not None and effect.scene.virtual_shutter.identity:
         _keep(effect.scene.virtual_shutter.identity, effect)
 
 
 def copy(effect: PropertyGroup, strip: Strip) -> None:
-    """Keep an effect of a strip, for `paste`."""
+    """Keep a copy of an effect in memory, for `paste`; it replaces the last copy.
+
+    Args:
+        strip: The effect strip of `effect`.
+    """
     places = match_source.places(effect, strip)
     _keep(_COPIED, effect, first=strip.left_handle, skipped=strips.skipped(strip), places=places)
 
@@ -48,7 +52,8 @@ def forget_copy() -> None:
 def paste(effect: PropertyGroup, strip: Strip) -> None:
     """Replace an effect's shutters, regions, keyframes and options by those of the copied effect.
 
-    Frames count from the first frame of each strip. Drawings keep their place on the picture.
+    Keyframes and drawings keep their distance in time from the strip's first frame, and drawings their place on the
+    picture.
 
     Args:
         strip: The effect strip of `effect`.
@@ -93,7 +98,7 @@ def restore(scene: Scene, identity: str) -> Scene | None:
     """Make a kept effect again in a scene, with a new effect scene.
 
     Args:
-        identity: Of the effect scene that it had.
+        identity: Identity (unique text) of the effect scene that the effect had.
 
     Returns:
         The new effect scene; None: no effect was kept under this identity.
@@ -111,8 +116,8 @@ def _restore(scene: Scene, effect: PropertyGroup, data: dict, content: dict) -> 
     """Fill an effect with properties, keyframes and strokes that were kept.
 
     Args:
-        data: What _keep has kept, for F-curves and strokes.
-        content: The properties to set.
+        data: What _keep has kept; only its F-curves and strokes are used.
+        content: Values of the effect's properties, by name.
     """
     _fill(effect, content)
     for plain in data["curves"]:

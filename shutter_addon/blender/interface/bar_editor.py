@@ -39,12 +39,12 @@ class Layout:
     top: float
 
     def bar_at(self, x: float) -> int:
-        """Return the index of the bar at x. Beyond the ends it is the first or last one."""
+        """Return the index of the bar at x (pixels). Beyond the ends, return the first or last bar's."""
         left, _, right, _ = self.box
         return min(max(int((x - left) / (right - left) * self.count), 0), self.count - 1)
 
     def weight_at(self, y: float) -> float:
-        """Return the weight of a bar that reaches up to y, at least 0."""
+        """Return the weight of a bar that reaches up to y (pixels), at least 0."""
         _, bottom, _, top = self.box
         return max((y - bottom) / (top - bottom) * self.top, 0.0)
 
@@ -76,11 +76,13 @@ def _layout(context: Context, bars: np.ndarray) -> Layout:
 def painted(
     values: np.ndarray, place: Layout, start: tuple[float, float], end: tuple[float, float], snap: bool
 ) -> np.ndarray:
-    """Return bars (L,) after the pointer was dragged between two points: each bar on its way gets its height there.
+    """Return bars (L,) after the pointer was dragged between two points: each bar on the way gets a new weight.
+
+    It is the weight at the height of the line between the points.
 
     Args:
         values: The bars before, (L,).
-        place: Where they lie.
+        place: Where the bars lie.
         start: Point in pixels of the region.
         end: Point in pixels of the region.
         snap: Round weights to multiples of _SNAP.
@@ -105,7 +107,7 @@ def bar_under(context: Context, x: float, y: float) -> int | None:
 
 
 def _seen(context: Context) -> tuple[Scene, PropertyGroup, Strip, np.ndarray, list[str]] | None:
-    """Return what the bar editor shows; None: no effect is visible, or its bars are invalid.
+    """Return what the bar editor shows; None: no effect is visible, it has no shutter, or its bars are invalid.
 
     Returns:
         Scene, effect and effect strip, the active shutter's bars (L,), and their key states (bar_edits.key_state).
@@ -190,7 +192,7 @@ def _draw_header(place: Layout, shutter: PropertyGroup, index: int, words: str) 
     """Draw the shutter's color with its pattern, and a text, above the bars.
 
     Args:
-        index: Of the shutter.
+        index: Index of the shutter, which determines the pattern.
         words: The text.
     """
     unit, (left, _, _, top) = drawing.ui_scale(), place.box

@@ -44,7 +44,7 @@ def wrapped(words: str, width: float, size: float | None = None) -> list[str]:
     """Break a text into lines that are at most `width` pixels wide.
 
     Args:
-        size: Of the letters, in points; None: as in Blender's panels.
+        size: Size of the letters in points; None: as in Blender's panels.
     """
     blf.size(0, (size or bpy.context.preferences.ui_styles[0].widget.points) * ui_scale())
     lines = [""]
@@ -113,7 +113,8 @@ def swatch(left: float, bottom: float, size: float, shutter: PropertyGroup, inde
 
     Args:
         size: Side of the square.
-        index: Of the shutter, which determines the pattern.
+        left, bottom: Lower left corner.
+        index: Index of the shutter, which determines the pattern.
     """
     left, bottom = round(left), round(bottom)
     rectangles([(left, bottom, left + size, bottom + size)], [(*shutter.color, 1.0)])
@@ -129,7 +130,7 @@ def lines(points: ArrayLike, color: Sequence[float], closed: bool = False, width
 
     Args:
         closed: Also draw from the last point to the first.
-        width: In line_width().
+        width: Width of the line, in multiples of line_width().
     """
     points = np.asarray(points, dtype=np.float32)
     if len(points) < 2:
@@ -149,7 +150,7 @@ def text(x: float, y: float, words: str, until: float | None = None) -> None:
     """Draw a line of text, with its lower left corner at (x, y).
 
     Args:
-        until: x at which it is cut off; None: nowhere.
+        until: x at which the text is cut off; None: nowhere.
     """
     size = SIZE * ui_scale()
     blf.size(0, size)
@@ -189,8 +190,8 @@ class Quad:
         """Draw a picture, or a part of its width, with a pass of shaders/show.glsl.
 
         Args:
-            name: Of the pass.
-            textures: The pass's textures, by sampler.
+            name: Name of the pass.
+            textures: The pass's textures, by sampler name.
             left: Left edge of the drawn part, as a fraction of the picture's width.
             right: Right edge of it.
             constants: Values of the pass's constants.

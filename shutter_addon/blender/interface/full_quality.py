@@ -45,9 +45,9 @@ class SHUTTER_OT_full_quality(Named, Operator):
 
 
 def _shown(context: Context) -> tuple[Window, Area, preview_areas.Shown] | None:
-    """Return a preview that shows an effect: window, area and what it shows; None: there is none.
+    """Return a preview that shows an effect: window, area and the shown effect strip; None: no preview does.
 
-    The area of the context comes first.
+    Prefer the area of the context.
     """
     areas = sorted(preview_areas.previews(context), key=lambda pair: pair[1] != context.area)
     for window, area in areas:
@@ -60,10 +60,10 @@ def _shown(context: Context) -> tuple[Window, Area, preview_areas.Shown] | None:
 def _bring_back(address: int, proxies: tuple[str, bool], rows: float, centre: tuple[float, float]) -> float | None:
     """Restore zoom, center and proxy settings of a preview once *Full Quality* has ended. This is a timer of Blender.
 
-    What the user has changed meanwhile stays.
+    Settings that the user has changed meanwhile stay.
 
     Args:
-        address: Of the area, as_pointer().
+        address: Address of the preview's area (as_pointer()).
         proxies: proxy_render_size and use_proxies to restore.
         rows: Zoom to restore, as in `_view_of`.
         centre: Center to restore, as in `_view_of`.

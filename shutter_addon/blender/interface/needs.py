@@ -20,7 +20,7 @@ def a_region(effect: PropertyGroup) -> str | None:
 
 
 def _of_kind(kinds: Collection[str], sentence: str) -> Need:
-    """Return a condition that the active region is of one of some kinds.
+    """Return a condition: a function that returns why the active region is of none of some kinds, or None.
 
     Args:
         kinds: Items of choices.KINDS.

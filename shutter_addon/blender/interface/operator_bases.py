@@ -29,7 +29,7 @@ def redraw(context: Context) -> None:
 
 
 def report(operator: Operator, sentence: str, kind: str = "WARNING") -> set[str]:
-    """Show a translated sentence as an operator's warning or error. *Copy Report* gets it without its names.
+    """Show a translated sentence as an operator's warning or error. *Copy Report* gets it without names and paths.
 
     Args:
         kind: "WARNING" or "ERROR".
@@ -43,19 +43,19 @@ def report(operator: Operator, sentence: str, kind: str = "WARNING") -> set[str]
 
 
 def given(kind: Callable, name: str, description: str, **more: Any) -> Any:
-    """Return a property of an operator that buttons set and Blender does not remember for the next call.
+    """Make a property for an operator, which buttons set and whose value Blender does not remember for the next call.
 
     Args:
         kind: A function of bpy.props, such as StringProperty.
-        more: Further arguments of it.
+        more: Further arguments of that function.
     """
     return kind(name=name, description=description, options={"SKIP_SAVE"}, **more)
 
 
 def kept(items: Callable[[Context], Iterable[tuple]]) -> Callable[[object, Context], list[tuple]]:
-    """Turn a function of the context into the `items` of an EnumProperty.
+    """Turn a function of the context into a function for the `items` of an EnumProperty.
 
-    It keeps the last list in memory, because Blender reads the strings in it later.
+    The new function keeps its last list in memory, because Blender reads the strings in it later.
     """
     last: list[tuple] = []
 
@@ -220,7 +220,7 @@ class Beside(Named):
         return self.tried(self.end, context, is_stopped)
 
     def cancel(self, context: Context) -> None:
-        """Stop when Blender closes the operator's window."""
+        """Stop the operator. Blender calls this when it closes the operator's window."""
         self.leave(context)
 
 
@@ -241,7 +241,7 @@ def chosen_file(operator: Operator) -> str:
     """Return the path of the file that the user chose for an operator.
 
     Raises:
-        RecipeError: None was chosen.
+        RecipeError: No file was chosen.
     """
     if not operator.filepath:
         raise recipe.RecipeError(rpt_("Choose a file"))

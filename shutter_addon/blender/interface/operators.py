@@ -38,7 +38,7 @@ def why_no_effect(context: Context) -> str | None:
 
 
 def give_effect(context: Context) -> None:
-    """Add an effect with the usual shutters to the active strip, select its strip and show its panel.
+    """Add an effect with the usual shutters to the active strip, select the effect strip and show its panel.
 
     Raises:
         FAULTS: The strip's footage cannot be read.
@@ -116,7 +116,7 @@ def _choose_tab(waits: Iterator[float]) -> float | None:
     """Open the sidebar's Shutter tab in all previews, once they are drawn. This is a timer of Blender.
 
     Args:
-        waits: Seconds to wait each time a sidebar is not drawn yet. When they run out, it is left as it is.
+        waits: Seconds to wait, one value for each try while a sidebar is not drawn yet. After the last, give up.
     """
     areas = [area for _window, area in preview_areas.previews(bpy.context)]
     sidebars = [next(region for region in area.regions if region.type == "UI") for area in areas]
@@ -160,10 +160,10 @@ def _move(effect: PropertyGroup, kind: str, direction: str, places: list[int]) -
     Args:
         kind: "shutter" or "region".
         direction: "UP" or "DOWN".
-        places: Indices of those that the list shows.
+        places: Indices of the items that the list shows.
 
     Returns:
-        {"CANCELLED"} if it is at the end already.
+        {"CANCELLED"} if the item is at that end of the list already, else None.
     """
     index = getattr(effect, f"active_{kind}")
     step = places.index(index) + (1 if direction == "DOWN" else -1)
@@ -282,7 +282,7 @@ def _take_tool(by: Operator, context: Context, effect: PropertyGroup, tool: str,
 
     Args:
         by: The operator that reports if there is no preview.
-        tool: Blender's name of it.
+        tool: Blender's identifier of the tool.
         layer: Which of the region's layers, one of annotations.LAYERS.
     """
     region = selection.active_region(effect)

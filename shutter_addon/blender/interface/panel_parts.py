@@ -29,7 +29,7 @@ def sentence(layout: UILayout, words: str, icon: str = "NONE", room: float = 1.0
     """Draw a translated sentence, broken into as many lines as the panel's width needs.
 
     Args:
-        room: Fraction of the panel's width that it has.
+        room: Fraction of the panel's width that the sentence has.
         is_quiet: Draw it greyed out.
     """
     unit, region = drawing.ui_scale(), bpy.context.region
@@ -69,10 +69,10 @@ def draw_list(layout: UILayout, effect: PropertyGroup, kind: str, count: int) ->
 def draw_operators(layout: UILayout, *names: str) -> None:
     """Draw buttons or menu entries for operators of the extension.
 
-    An operator with `choices` becomes a submenu of them.
+    An operator with `choices` becomes a submenu of its choices.
 
     Args:
-        names: What follows "shutter." in their bl_idname; "" draws a separator. Those of removed features are left out.
+        names: Names of operators, without "shutter."; "" draws a separator. Those of removed features are left out.
     """
     for name in names:
         if not name:
@@ -134,7 +134,7 @@ def menu(name: str, label: str) -> Callable[[Callable[[UILayout, Context], None]
 
 @cache
 def _icons() -> ImagePreviewCollection:
-    """Make the icons of presets, under their names, and of patterns, under their numbers. They are made once."""
+    """Return the icons of presets (by name) and of shutters' patterns (by number). They are made once."""
     icons = bpy.utils.previews.new()
     pictures = {name: _drawn(shutters.preset_bars(name, _WINDOW)) for name in shutters.PRESETS}
     pictures |= {str(index): _painted(index) for index in range(patterns.COUNT)}
@@ -154,13 +154,13 @@ def pattern_icon(index: int) -> int:
     """Return the icon number of a shutter's pattern, for `icon_value`; 0 in the background.
 
     Args:
-        index: Of the shutter.
+        index: Index of the shutter.
     """
     return icon_of(str(index % patterns.COUNT))
 
 
 def _drawn(bars: np.ndarray) -> np.ndarray:
-    """Return an icon (_SIZE, _SIZE, 4) float32 of bars, bottom row first."""
+    """Return an icon that shows a shutter's bars: pixels (_SIZE, _SIZE, 4), float32, bottom row first."""
     picture = np.zeros((_SIZE, _SIZE, 4), dtype=np.float32)
     width = _SIZE // len(bars)
     picture[1, :] = 0.5
@@ -170,7 +170,11 @@ def _drawn(bars: np.ndarray) -> np.ndarray:
 
 
 def _painted(index: int) -> np.ndarray:
-    """Return an icon (_SIZE, _SIZE, 4) float32 of a pattern, bottom row first."""
+    """Return an icon that shows a shutter's color pattern: pixels (_SIZE, _SIZE, 4), float32, bottom row first.
+
+    Args:
+        index: Index of the shutter.
+    """
     y, x = (np.mgrid[:_SIZE, :_SIZE] + 0.5) * _UNITS / _SIZE
     picture = np.ones((_SIZE, _SIZE, 4), dtype=np.float32)
     picture[..., :3] = patterns.painted(_LIGHT, index, x, y)

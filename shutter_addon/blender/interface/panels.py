@@ -189,7 +189,7 @@ def _notes(context: Context) -> Iterator[tuple[str, str]]:
     """Yield notes about the active effect, such as differences from its source.
 
     Yields:
-        The sentence, and the bl_idname of an operator that helps, or "".
+        The sentence, and the bl_idname of an operator that solves the problem, or "".
     """
     scene, effect, strip = selection.active(context)
     if (newer := data_format.note([scene, *bpy.data.scenes])) is not None:
@@ -210,7 +210,7 @@ def _notes(context: Context) -> Iterator[tuple[str, str]]:
 
 
 def _tracked(effect: PropertyGroup) -> list[int | None]:
-    """Return what is active and may be tracked, as indices of selection.moving: a region, and None for the camera."""
+    """Return what may be tracked: the active region's index, and None if the active shutter follows the camera."""
     region = [effect.active_region] if selection.active_region(effect) is not None else []
     shutter = selection.active_shutter(effect)
     return region + ([None] if shutter is not None and shutter.follow == "CAMERA" else [])
@@ -274,7 +274,7 @@ def _draw_regions(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip
 
 
 def _draw_matte(layout: UILayout, region: PropertyGroup) -> None:
-    """Draw where a region's matte comes from, and the settings of that."""
+    """Draw the settings of a region's matte: where it comes from (strip, image and so on) and how it is read."""
     layout.prop(region, "matte")
     if region.matte == "IMAGE":
         layout.template_ID(region, "image", open="image.open")

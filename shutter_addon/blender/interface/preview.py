@@ -47,7 +47,7 @@ def _view_chosen(_settings: PropertyGroup, context: Context) -> None:
 
 
 def _redraw_when_still() -> float | None:
-    """Redraw once scrubbing or tracking has ended, which Blender does not do. This is a timer of Blender."""
+    """Redraw previews once scrubbing or tracking has ended, since Blender does not. This is a timer of Blender."""
     if previews.is_going(bpy.context):
         return _SOON
     preview_areas.redraw()
@@ -128,11 +128,11 @@ def _draw() -> None:
 
 
 def _show(context: Context, shown: Shown, decision: Decision | None, say: Say) -> None:
-    """Draw the effect over its preview, or add a note why that is impossible.
+    """Draw the effect over its preview, or add a note about why that is impossible.
 
     Args:
         shown: The effect strip that the preview shows.
-        decision: What the engine was asked for just before, and who draws it; None: it was not asked.
+        decision: What the engine was asked for just before, and who draws it; None: the engine was not asked.
         say: Adds a note.
     """
     try:
@@ -191,7 +191,9 @@ def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, s
 
 
 def _tell_detail(wanted: Drawing, size: tuple[int, int], say: Say) -> None:
-    """Add a note about what a preview has less than a render: size, the footage itself, fine edges.
+    """Add a note about how a preview is worse than a render: smaller, from a proxy, or with draft edges.
+
+    With *Full Quality*, the note says that the picture is as it will be rendered.
 
     Args:
         wanted: What is drawn.
@@ -224,7 +226,7 @@ def _show_sharp(context: Context, shown: Shown | None) -> None:
 
 
 def _show_strokes(context: Context, quad: Quad, shown: Shown, snapshot: Snapshot) -> None:
-    """Draw the strokes of all regions where they are at the current frame, with their region's motion."""
+    """Draw the strokes of all visible regions, moved to where their region is at the current frame."""
     if not context.space_data.show_overlays:
         return
     frame = shown.scene.frame_current
@@ -258,12 +260,12 @@ def _show_source(quad: Quad, shown: Shown, renderer: Renderer, request: Request,
 def _show_shares(
     quad: Quad, step: str, colors: Colors, drawn: tuple[Texture, int], renderer: Renderer, opacity: float, **more
 ) -> None:
-    """Draw in the shutters' colors which shutter is drawn on each pixel (labels), or its shares of all (coefficients).
+    """Draw in the shutters' colors which shutter's strokes cover each pixel, or the share of each shutter in the pixel.
 
     Args:
-        step: Pass of shaders/show.glsl that draws them; also the name of the view.
+        step: Pass of shaders/show.glsl that draws this; also the name of the view.
         colors: Of the shutters, display values 0 to 1.
-        drawn: The texture, and the side in pixels of the blocks that share a texel.
+        drawn: The texture of labels or shares, and the side in pixels of the blocks that share a texel.
         opacity: 0 to 1.
         more: Further constants of the pass.
     """

@@ -25,16 +25,15 @@ _MARK = (1.0, 1.0, 1.0, 0.9)
 def probed_at(renderer: Renderer, request: Request, point: Sequence[float]) -> tuple[np.ndarray, np.ndarray] | None:
     """Return how a pixel is exposed: how much of each shutter it gets, and how much each frame counts for it.
 
-    To be called where Blender's GPU draws; one texel is read from it. The shares of shutters are computed again only if
-    something changed since they were drawn.
+    Call this only while Blender draws, because one texel is read from its GPU. The shares of shutters are
+    computed again only if something changed since they were drawn.
 
     Args:
         point: In fractions of the picture, y up.
 
     Returns:
-        The share of each shutter (N,), which sum to 1, and the weight of each frame (L,); None: the point is outside
-        the
-        picture.
+        The share of each shutter (N,), which sum to 1, and the weight of each frame (L,); None: the point is
+        outside the picture.
     """
     source = renderer.source
     column, row = int(np.floor(point[0] * source.width)), int(np.floor((1 - point[1]) * source.height))
@@ -73,7 +72,7 @@ def layout(point: Sequence[float], size: tuple[int, int], count: int, unit: floa
 
 
 def _view(context: Context) -> View | None:
-    """Return where the preview shows the effect's picture; None: it shows none, or too small."""
+    """Return where the preview shows the effect's picture; None: it shows no effect, or the picture is too small."""
     if (shown := preview_areas.shown(context)) is None:
         return None
     seen = view(shown.effect, shown.strip, context.region)
@@ -108,12 +107,12 @@ class SHUTTER_GT_probe(Gizmo):
 
 
 def _draw(region: Region, point: Sequence, shutters: Sequence, shares: np.ndarray, mixed: np.ndarray) -> None:
-    """Draw the probe.
+    """Draw the probe: a box with the pixel's bars, and a line of text for each of its shutters.
 
     Args:
         point: Probed point in pixels of the region.
         shares: How much of each shutter the pixel gets (N,).
-        mixed: How much each frame counts for it (L,).
+        mixed: How much each frame counts for the pixel (L,).
     """
     unit = drawing.ui_scale()
     frame, bars, lines = layout(point, (region.width, region.height), len(shutters), unit)

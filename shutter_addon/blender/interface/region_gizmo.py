@@ -38,9 +38,9 @@ class Place(NamedTuple):
 
 
 def _strokes_now(scene: Scene, effect: PropertyGroup, strip: Strip) -> list[np.ndarray]:
-    """Return the active region's strokes (n, 2), or the line of a ramp, in fractions of the picture, before its motion.
+    """Return the active region's strokes (n, 2), or the line of a ramp, in fractions of the picture.
 
-    They are kept until something changes.
+    They are where they would be without the region's motion, and are cached until something changes.
     """
     index, frame = effect.active_region, scene.frame_float
     region = effect.regions[index]

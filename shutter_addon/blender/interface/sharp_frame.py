@@ -17,10 +17,10 @@ _TOOLS = "builtin.annotate"  # prefix of the tools' names
 
 
 def take_up(context: Context, tool: str) -> bool:
-    """Activate an annotation tool in the previews until a stroke is finished. Return whether there is a preview.
+    """Activate an annotation tool in all previews until a stroke is finished. Return whether a preview is open.
 
     Args:
-        tool: Blender's name of it.
+        tool: Blender's identifier of the tool.
     """
     before = context.workspace.tools.from_space_sequencer("PREVIEW", create=False)
     if before is None or not before.idname.startswith(_TOOLS):
@@ -38,7 +38,7 @@ def _choose(context: Context, tool: str) -> bool:
 
 
 def show(context: Context) -> None:
-    """Show the active effect's source frame in the previews that have its annotation.
+    """Show the active effect's source frame, to draw on, in the previews that have the effect's annotation.
 
     Do nothing if the source is muted, or does not lie in the same meta strip as the effect.
     """
@@ -86,7 +86,10 @@ def is_shown(space: SpaceSequenceEditor) -> bool:
 
 
 def _tool_chosen() -> None:
-    """Show the result if the user has activated a tool that does not draw. Blender redraws no preview then."""
+    """Show the result instead of the source frame, if the user has activated a tool that does not draw.
+
+    Blender calls this when the active tool changes, because it redraws no preview then.
+    """
     tool = bpy.context.workspace.tools.from_space_sequencer("PREVIEW", create=False)
     if tool is not None and not tool.idname.startswith(_TOOLS):
         looking.pen.tool = ""
@@ -112,7 +115,7 @@ _OWNER = object()  # of the message bus subscription
 
 
 def listen() -> None:
-    """Subscribe to changes of the active tool. To be called after each file is loaded, which ends subscriptions."""
+    """Subscribe to changes of the active tool. Call this after each file is loaded, which ends them."""
     tools = bpy.types.WorkSpace, "tools"
     bpy.msgbus.clear_by_owner(_OWNER)
     bpy.msgbus.subscribe_rna(key=tools, owner=_OWNER, args=(), notify=_tool_chosen)

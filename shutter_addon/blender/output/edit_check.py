@@ -18,13 +18,13 @@ from .film_output import OutputError
 
 
 def effects(scene: Scene, frames: range) -> tuple[list[str], list[str], set[Path]]:
-    """Check all effects that are shown at these frames of a film, also in scenes inside it, each up to its first fault.
+    """Check all effects that some frames of a film show, also in scenes inside its scene, each up to its first fault.
 
-    Files are opened, and the first and last frames that are needed are read.
+    Open the footage and mattes, and read the first and last frames that are needed of each.
 
     Returns:
-        Faults: why the edit cannot be rendered. Notes: what can be rendered, but not as one may expect. The folders to
-        which the render will write mattes.
+        Three values: faults, sentences about why the edit cannot be rendered; notes about what may look unexpected; and
+        the folders to which the render will write mattes.
     """
     faults, notes, folders = list[str](), list[str](), set[Path]()
     # No GPU is needed, which would have to wait for its first picture, since only states and windows are read.
@@ -47,7 +47,7 @@ def _shown_effects(film: Scene, frames: range) -> Iterator[tuple]:
     """Yield all effects that are shown at some of a film's frames.
 
     Yields:
-        Scene, effect, its first effect strip, and the timeline frames of the scene at which it is shown.
+        Scene, effect, its first effect strip, and the timeline frames of that scene at which the effect is shown.
     """
     wanted = requirements.shown_scenes(film, frames)
     for scene, effect, parts in job_snapshots.shown_effects(film):
@@ -61,7 +61,7 @@ def _shown_effects(film: Scene, frames: range) -> Iterator[tuple]:
 
 
 def _notes(session: RenderSession, folders: set[Path], taken: snapshot.Snapshot) -> list[str]:
-    """Check one effect, and return notes for the user about it.
+    """Check the footage and mattes of one effect at the frames of its snapshot, and return notes for the user.
 
     Args:
         folders: A set to which the folders of mattes that the render has to track are added.
@@ -86,12 +86,12 @@ def _notes(session: RenderSession, folders: set[Path], taken: snapshot.Snapshot)
 
 
 def _check_footage(scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
-    """Check that an effect's footage is there, and has the size and length that it had when the edit was saved.
+    """Check that an effect's footage is there, has the size as when the edit was saved, and is not shorter.
 
-    The effect scene has the size of the footage then.
+    The effect scene stores the size. The length is not checked if the source strip is retimed.
 
     Raises:
-        UserError: It is gone, or has changed.
+        UserError: The footage is missing, or has changed.
     """
     source = strips.source_of(scene, effect, strip)
     with source_media.spec(source).open() as medium:
@@ -112,7 +112,7 @@ def _check_readable(source: FrameSource, indices: set[int], step: int = 1) -> No
 
     Args:
         indices: Frames of the footage, from 0.
-        step: Moments from a frame of the footage to the next, which the source counts as frames.
+        step: How many of the source's frames (interpolated moments) lead from a frame of the footage to the next.
 
     Raises:
         MediaError: A file is missing, or a frame cannot be decoded.
@@ -128,7 +128,7 @@ def _lacking_mattes(source: FrameSource, requests: list[Request], folders: set[P
     """Check that the mattes of requested pictures can be read, and return how many of them have yet to be tracked.
 
     Args:
-        folders: A set to which the folders are added where these will be kept.
+        folders: A set to which the folders are added where the tracked mattes will be stored.
 
     Raises:
         MediaError: A matte cannot be read.

@@ -52,23 +52,23 @@ class _Film:
 
 
 def begin(scene: Scene) -> None:
-    """When a render of an edit begins, prepare to give it finished pictures. Only in renders without a window."""
+    """Prepare to give Blender finished pictures, when a render of an edit begins. Do so only without a window."""
     end()
     if render_job.where() is Where.BACKGROUND and scene.sequence_editor is not None:
         render_job.job.film_data.feed = _Film(scene.session_uid)
 
 
 def end() -> None:
-    """Remove the temporary strip and restore the edit."""
+    """Stop giving Blender finished pictures: remove the temporary strip and its file, and restore the edit."""
     film, render_job.job.film_data.feed = render_job.job.film_data.feed, None
     if film is not None:
         film.changed.close()
 
 
 def before_frame(scene: Scene) -> None:
-    """Before each frame of a render: write its levels to the file and show the file's strip, if that is possible.
+    """Write the next frame's levels to the file and show the file's strip, if that is possible.
 
-    Otherwise the strip is hidden, and Blender asks the engine.
+    Otherwise mute the strip, so that Blender asks the engine. Called before each frame; leaves the first to the engine.
     """
     film = render_job.job.film_data.feed
     if film is None or film.scene != scene.session_uid:
@@ -90,7 +90,7 @@ def _feed(film: _Film, scene: Scene, strip: Strip, is_blended: bool) -> bool:
 
     Args:
         strip: The effect strip that alone is visible.
-        is_blended: Whether Blender would blend it with one below.
+        is_blended: Whether Blender would blend that strip with one below.
 
     Returns:
         False if the engine has to render the frame, and report what is wrong.
@@ -118,11 +118,11 @@ def _feed(film: _Film, scene: Scene, strip: Strip, is_blended: bool) -> bool:
 
 
 def _file(film: _Film, scene: Scene) -> "LevelsFile":
-    """Return the file of levels. The first time, make it, and add a strip that shows it.
+    """Return the file of 8-bit levels. The first time, make the file, and add a strip that shows it.
 
     Raises:
-        OSError: It cannot be written.
-        ValueError: There is no channel for the strip.
+        OSError: The file cannot be written.
+        ValueError: There is no free channel for the strip.
     """
     if film.file is None:
         atomic_write.clear_up(place := Path(tempfile.gettempdir()))

@@ -26,10 +26,10 @@ PACKAGES = "numpy", "OpenImageIO", "av", "cv2", "moderngl"
 
 
 def text(scene: Scene | None) -> str:
-    """Return the report. To be called on the main thread.
+    """Return the error report as Markdown: versions, device, the edit, last errors. Call on the main thread.
 
     Args:
-        scene: The sequencer's scene, to describe; None: none.
+        scene: The scene whose edit is described; None: describe no edit.
     """
     lines = ["### Virtual Shutter: report of an error", ""]
     for part in (_versions, _device, partial(_edit, scene)):

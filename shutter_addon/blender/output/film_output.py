@@ -64,11 +64,11 @@ def check(path: Path, file_format: str | None, size: tuple[int, int]) -> None:
 
     Args:
         path: A movie, or a folder of pictures.
-        file_format: The option --format, which is for a folder; None: not given.
+        file_format: The option --format, which only a folder may have; None: not given.
         size: Width and height of the pictures in pixels.
 
     Raises:
-        OutputError: It cannot.
+        OutputError: Blender cannot write the film there.
     """
     width, height = size
     if width < 4 or height < 4:
@@ -85,13 +85,13 @@ def check(path: Path, file_format: str | None, size: tuple[int, int]) -> None:
 
 
 def check_folder(path: Path, file_format: str | None) -> None:
-    """Check that a path can be meant as a folder of pictures.
+    """Check that a path can be meant as a folder of pictures: it is a folder, or has no suffix as files have.
 
     Args:
         file_format: The option --format, with which any path is a folder; None: not given.
 
     Raises:
-        OutputError: It looks like a file of another kind.
+        OutputError: The path looks like a file of another kind.
     """
     if path.suffix.strip(".") and not path.is_dir() and file_format is None:
         raise OutputError(f"{path}: neither a folder nor one of {', '.join(MOVIES)}")
@@ -116,7 +116,7 @@ def check_writable(folder: Path) -> None:
     """Check that files can be written to a folder, or if it is missing, to the first folder above that exists.
 
     Raises:
-        OutputError: They cannot.
+        OutputError: Files cannot be written there.
     """
     place = next(path for path in (folder, *folder.parents) if path.exists())
     if not place.is_dir():
@@ -136,7 +136,7 @@ def refuse_overwriting(written: Iterable[Path], read: Collection[Path]) -> None:
         read: Files that will be read.
 
     Raises:
-        OutputError: One will.
+        OutputError: A file would be written twice, or over one of `read`.
     """
     taken = {_identity(path): path for path in read}
     places = set()
@@ -150,7 +150,7 @@ def refuse_overwriting(written: Iterable[Path], read: Collection[Path]) -> None:
 
 
 def _identity(path: Path) -> tuple[int, int] | str:
-    """Return a value that is equal for all paths that lead to the same file, or to the same place without a file."""
+    """Return a value that is equal for all paths that lead to the same file, or to the same place of a missing file."""
     try:
         status = os.stat(path)
     except OSError:
@@ -159,12 +159,12 @@ def _identity(path: Path) -> tuple[int, int] | str:
 
 
 def pictures_of(folder: Path, ending: str, frames: range) -> list[Path]:
-    """Return the paths of the pictures of these frames in a folder, such as 0001.png."""
+    """Return the paths of a film's pictures in a folder, one for each frame, such as 0001.png for frame 1."""
     return [folder / f"{frame:04d}.{ending}" for frame in frames]
 
 
 def blender_path(path: str) -> str:
-    """Return a path with its braces doubled, since Blender takes single ones for templates.
+    """Return a path with its braces doubled, since Blender takes single ones for template fields.
 
     Raises:
         OutputError: Blender cannot write to the path.
@@ -264,8 +264,8 @@ def render_frames(scene: Scene, output: Path, moved: Callable[[], None], move: M
 
     Args:
         output: The movie or the folder.
-        moved: Called after each frame. UserError or OSError end the render.
-        move: Called with a finished picture and its final path, to move it. It may raise the same.
+        moved: Called after each frame. If it raises UserError or OSError, the render ends.
+        move: Called with a finished picture and its final path, to move the picture there. It may raise the same.
 
     Raises:
         OutputError, InterruptedRenderError: As in `render_made_edit`.
@@ -302,10 +302,10 @@ def render_frames(scene: Scene, output: Path, moved: Callable[[], None], move: M
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder, and remove from it what processes that have ended left unfinished.
+    """Make a folder if it is missing, and remove unfinished files in it that processes left when they ended.
 
     Raises:
-        OSError: It cannot be made.
+        OSError: The folder cannot be made.
     """
     folder.mkdir(parents=True, exist_ok=True)
     atomic_write.clear_up(folder)
@@ -315,7 +315,7 @@ def _rescued(part: Path, output: Path) -> str:
     """Keep the finished part of a movie beside its output, under a new name.
 
     Returns:
-        The end of a sentence that says so; "": no frame is finished, or it cannot be kept.
+        The end of an error message, with the number of frames and the name; "": nothing is finished or can be kept.
     """
     count = whole_pictures(part)
     if count == 0:
@@ -341,7 +341,7 @@ def _moved(part: Path, output: Path, scene: Scene, update: Callable[[], None], m
 
     Args:
         update: Called after each frame.
-        move: Called with a finished picture and its final path. Either may raise to end the render.
+        move: Called with a finished picture and its final path. `update` and `move` may raise to end the render.
 
     Yields:
         The pictures that are still missing, by name; empty for a movie.
@@ -371,8 +371,8 @@ def progress(count: int, unit: str) -> Iterator[Callable]:
     """Show a progress bar on a terminal within a `with` block.
 
     Args:
-        count: Steps of the whole.
-        unit: What a step is called.
+        count: Number of steps until the bar is full.
+        unit: Name of a step, shown beside the bar.
 
     Yields:
         A function that advances the bar, by one step or by its argument.

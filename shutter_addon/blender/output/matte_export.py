@@ -25,9 +25,9 @@ EffectStrip = tuple[Scene, PropertyGroup, Strip]
 
 
 def recipe_for(scene: Scene, effect: PropertyGroup, strip: Strip, path: Path) -> Effect:
-    """Return an effect as a recipe that will be saved at `path`. Write mattes that have no file beside it.
+    """Return an effect as a recipe that will be saved at `path`. Write mattes that have no file of their own.
 
-    They are written into the folder "NAME mattes".
+    Their pictures are written into a folder "NAME mattes" beside the recipe.
 
     Raises:
         effect_source.FAULTS: The effect cannot be rendered, or a matte cannot be read or written.
@@ -70,11 +70,11 @@ def _ramp(region: PropertyGroup) -> RampContent:
 
 
 def _folder(region: PropertyGroup, path: Path, number: int) -> Path | None:
-    """Return the folder for the pictures of a region's matte; None: a recipe needs none, as for ramps and files.
+    """Return the folder for the pictures of a region's matte; None: the recipe needs none, as for ramps and files.
 
     Args:
-        path: Of the recipe.
-        number: Of the region, for the folder's name.
+        path: Path of the recipe.
+        number: Number of the region, for the folder's name.
     """
     if region.kind == "RAMP" or (region.matte == "IMAGE" and not _is_one_of_many(region)):
         return None
@@ -102,11 +102,11 @@ def _refuse_overwriting(folders: list[Path | None], *shown: Any) -> None:
     """Check that pictures are not written into a folder from which the effect reads others.
 
     Args:
-        folders: Where pictures will be written; None: none.
-        shown: Arguments of _read_files.
+        folders: Where pictures will be written; None entries are ignored.
+        shown: Scene, effect and effect strip, the arguments of _read_files.
 
     Raises:
-        EffectError: They would be.
+        EffectError: The effect reads pictures from one of the folders.
     """
     taken = {file.parent.resolve() for file in _read_files(*shown)}
     for folder in folders:
@@ -132,7 +132,7 @@ def _write(shown: EffectStrip, region: PropertyGroup, folder: Path, first: int, 
     """Write a matte as a picture for each timeline frame of the effect strip, all or none.
 
     Args:
-        first: Number of the first picture's name.
+        first: Number in the first picture's name; the others count on from it.
         suffix: "png" or "exr".
 
     Returns:

@@ -28,7 +28,7 @@ def check(folder: Path, file_format: str | None, frames: range, read: list[Path]
         read: Files that must not be overwritten.
 
     Raises:
-        OutputError: They cannot.
+        OutputError: The frames cannot be rendered there.
     """
     if film_output.is_movie(folder):
         raise film_output.OutputError(f"{folder}: a saved edit is rendered to a folder of pictures, not to a movie")
@@ -41,7 +41,7 @@ def check_resumable(scene: Scene) -> None:
     """Check that the edit's pictures can carry a note of its version, by which --resume recognizes finished ones.
 
     Raises:
-        OutputError: They cannot, because the edit burns metadata in.
+        OutputError: The edit burns metadata into its pictures, so that they carry no version.
     """
     if scene.render.use_stamp:
         why = "the edit burns metadata into its pictures, so that they carry no version; turn Burn Into Image off"
@@ -103,13 +103,13 @@ def _resume(scene: Scene, folder: Path, missing: dict[int, Path], key: str, writ
 
 
 def _claim_run(claims: Claims, missing: dict[int, Path], key: str, moved: Callable) -> list[int]:
-    """Claim a few missing frames without a gap for this process, and return them; []: others have claimed all.
+    """Claim up to RUN successive missing frames, so that no other process renders them, and return these frames.
 
-    Frames that turn out to be finished are removed from `missing`.
+    The list is empty if others have claimed all. Frames that turn out to be finished are removed from `missing`.
 
     Args:
         missing: Paths of the missing pictures, by frame.
-        key: Of the edit's version, which finished pictures carry.
+        key: Key of the edit's version, which finished pictures carry.
         moved: Called for each finished frame.
     """
     run: list[int] = []
@@ -130,5 +130,5 @@ def _claim_run(claims: Claims, missing: dict[int, Path], key: str, moved: Callab
 
 
 def _name(picture: Path) -> str:
-    """Return the name under which a picture is claimed."""
+    """Return the name under which processes claim a picture, such as 0001_png for 0001.png."""
     return f"{picture.stem}_{picture.suffix[1:]}"

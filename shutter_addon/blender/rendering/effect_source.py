@@ -29,7 +29,7 @@ FAULTS = (EffectError, MediaError, NoDeviceError, MemoryError)
 
 
 def in_words(error: BaseException) -> str:
-    """Return a sentence for the user about an error that ended a picture. *Copy Report* keeps unexpected ones."""
+    """Return a sentence for the user about an error that ended a picture. Log an unexpected error for *Copy Report*."""
     if isinstance(error, FAULTS):
         return str(error) or "not enough memory"
     if isinstance(error, KeyboardInterrupt):
@@ -84,7 +84,7 @@ class SourceKey:
 
     @staticmethod
     def of(snapshot: Snapshot, detail: Detail = FULL) -> SourceKey:
-        """Return the key for an effect in pictures of some detail.
+        """Return the key of what a renderer reads for an effect's pictures in this detail.
 
         Raises:
             EffectError, MediaError: The footage cannot be read to find the steps.
@@ -97,14 +97,14 @@ class SourceKey:
 
     @property
     def place(self) -> tuple[int, bool]:
-        """Where a session keeps its renderer: an effect has one with moments between frames, and one without."""
+        """Key under which a session keeps the renderer: (effect scene's session_uid, has moments between frames)."""
         return self.scene, self.steps > 1
 
     def open(self, *, planes: bool = False, keeps: bool = False) -> ShotSource:
         """Open the footage.
 
         Args:
-            planes: Give frames as the decoder's planes where only their conversion is missing, as in PrefetchSource.
+            planes: Give frames as the decoder's planes where only their color conversion is missing (PrefetchSource).
             keeps: Write newly computed optical flow vectors to `folder`.
 
         Raises:
@@ -123,7 +123,7 @@ class SourceKey:
 
 
 def known_steps(snapshot: Snapshot) -> int | None:
-    """Return what find_steps returns, without any work; None: it was not found yet."""
+    """Return the result of find_steps if it is known already; None: find_steps would have to compare frames."""
     key = steps_key(snapshot)
     return 1 if key[1] == 1 else _steps.get(key)
 
@@ -147,7 +147,7 @@ def find_steps(snapshot: Snapshot) -> int:
 
 
 def steps_of(medium: FrameSource, smooth: int | str, window: int, *, skip_repeats: bool) -> int:
-    """Return the steps from a frame of the footage to the next that the feature `smooth` finds; 1 without that feature.
+    """Return how many steps lead from a frame of the footage to the next; 1 if the feature `smooth` is not installed.
 
     Args:
         smooth: The effect's option *Smooth*: a number of steps, or a word for automatic.
@@ -160,18 +160,18 @@ def steps_of(medium: FrameSource, smooth: int | str, window: int, *, skip_repeat
 
 
 def steps_key(snapshot: Snapshot) -> tuple:
-    """Return what an effect's number of steps depends on: footage, *Smooth*, window, *Skip Repeats*."""
+    """Return a key of all that an effect's number of steps depends on: footage, *Smooth*, window, *Skip Repeats*."""
     options = _options(snapshot)
     return snapshot.source.key, options.step, options.window, options.skip_repeats
 
 
 def _options(snapshot: Snapshot) -> Options:
-    """Return an effect's options at any of its frames; those that are used here cannot be keyed."""
+    """Return an effect's options at its first frame. Those that this module uses are the same at all frames."""
     return snapshot.effect.options.at(min(snapshot.frames))
 
 
 def open_source(snapshot: Snapshot) -> ShotSource:
-    """Open an effect's footage in full detail.
+    """Open an effect's footage in full detail, with interpolated moments between frames if the effect wants them.
 
     Raises:
         EffectError, MediaError: It cannot be read.

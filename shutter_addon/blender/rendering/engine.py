@@ -83,7 +83,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
                 render_pass.rect.foreach_set(values)
 
     def fail(self, sentence: str) -> None:
-        """Report why there is no picture. End a film's render, which would write the frame without the effect."""
+        """Report why there is no picture. End a running render, which would write the frame without the effect."""
         if render_job.ends_films():
             render_job.fail(sentence)
             render_job.cancel(self.test_break)

@@ -36,7 +36,7 @@ _frames = _Frames()
 
 
 def current(scene: Scene, effect: PropertyGroup, strip: Strip, frame: float) -> Snapshot:
-    """Return the snapshot of an effect strip at a timeline frame, for drawing. It is kept until something changes.
+    """Return the snapshot of an effect strip (plain data) at a timeline frame, cached until something changes.
 
     Raises:
         EffectError, MediaError: As in snapshot.take.
@@ -46,7 +46,7 @@ def current(scene: Scene, effect: PropertyGroup, strip: Strip, frame: float) -> 
 
 
 def forget() -> None:
-    """Forget what is known of a file's effects, before another file is loaded."""
+    """Forget cached data about the file's effects and frames, before another file is loaded."""
     _frames.signatures.clear()
     revision.changed()
 
@@ -57,7 +57,7 @@ def mark_failed(scene: int) -> None:
 
 
 def drop_failed() -> None:
-    """Drop frames of effects that failed: the sequencer would show them again without asking the engine."""
+    """Drop the frames that the sequencer keeps of failed effects; it would show them without asking the engine."""
     _drop(_frames.failed)
 
 
@@ -71,7 +71,7 @@ def mark_reduced(scene: int) -> None:
 
 
 def drop_reduced() -> None:
-    """Drop the frames that were noted by mark_reduced."""
+    """Drop the frames that the sequencer keeps of the effects that mark_reduced has noted."""
     _drop(_frames.reduced)
 
 
@@ -85,9 +85,10 @@ def _drop(noted: set[int]) -> None:
 
 
 def invalidate_changed(scene: Scene) -> bool:
-    """Drop the frames of a scene's effects whose keys, strokes or source have changed. Return whether there were any.
+    """Drop the frames of a scene's effects whose keys, strokes or source have changed.
 
-    Values of keyed properties do not count, as they change with every frame that plays.
+    Return whether an effect has changed. Current values of keyed properties do not count, as they change with every
+    frame that plays.
     """
     if not scene.virtual_shutter.effects:
         return False

@@ -49,14 +49,14 @@ def _part_at(parts: list[tuple[range, Snapshot]], scene_frame: float) -> Snapsho
     """Return the snapshot of the part of a cut strip that shows a frame of the effect scene; else the first part's.
 
     Args:
-        parts: Timeline frames and snapshot of each part.
+        parts: Timeline frames and snapshot of each part of the strip.
     """
     frame = parts[0][1].timeline_frame(scene_frame)
     return next((taken for shown, taken in parts if shown.start <= frame < shown.stop), parts[0][1])
 
 
 def end() -> None:
-    """Forget all snapshots, after a render."""
+    """Forget all snapshots after a render, and have sessions stop making pictures ahead."""
     job.film_data = render_job.FilmData(feed=job.film_data.feed)
     sessions.end_job()
 
@@ -80,10 +80,10 @@ def left_out(scene: Scene) -> str | None:
 
 
 def of(effect_scene: Scene, scene_frame: float, ended: Callable[[], bool] | None = None) -> tuple[Snapshot, float]:
-    """Return the snapshot (plain data) for a frame of an effect scene, and the timeline frame at which that is shown.
+    """Return the snapshot (plain data) for a frame of an effect scene, and the timeline frame that shows it.
 
     Args:
-        ended: Tells whether the result is no longer wanted; None: wait for a few seconds at most.
+        ended: Called to tell whether the result is no longer wanted; None: wait for a few seconds at most.
 
     Raises:
         effect_source.FAULTS: The effect cannot be shown.
@@ -109,7 +109,7 @@ def of(effect_scene: Scene, scene_frame: float, ended: Callable[[], bool] | None
 def _of_film(scene: Scene, effect: PropertyGroup, strip: Strip, frame: float) -> Snapshot:
     """Return the snapshot for a timeline frame in the background: a kept one if it has the frame, else a new one.
 
-    From a film's second frame on, it has all frames of the film.
+    A snapshot that is taken from a film's second frame on has all frames of the film.
     """
     key, frames = (effect.scene.session_uid, strip.name), {frame, frame + scene.frame_step}
     is_again = key in job.film_data.read and not render_job.scripts_act()
@@ -125,13 +125,14 @@ def _of_film(scene: Scene, effect: PropertyGroup, strip: Strip, frame: float) ->
 
 
 def _late(uid: int, scene_frame: float) -> Snapshot:
-    """Return a snapshot that was not taken when a render began. Called on the main thread.
+    """Take the snapshot for one frame, which was not taken when the render began. Called on the main thread.
 
     Args:
         uid: session_uid of the effect scene.
+        scene_frame: Frame of the effect scene.
 
     Raises:
-        effect_source.FAULTS: The effect cannot be shown.
+        effect_source.FAULTS: The effect cannot be shown, or was deleted.
     """
     if (effect_scene := strips.scene_of_uid(uid)) is None:
         raise EffectError(rpt_("the effect was deleted while it was rendered"))

@@ -33,7 +33,7 @@ def picture(context: RenderContext, snapshot: Snapshot, frame: float, detail: De
     It is scene-linear float32 with premultiplied alpha, or 8-bit display levels if the context asks for them.
 
     Args:
-        context: Session, messages and stop of whoever wants it.
+        context: The session that makes the picture, and the form that is wanted (RenderContext).
 
     Raises:
         effect_source.FAULTS: The picture cannot be made.
@@ -54,9 +54,9 @@ def picture(context: RenderContext, snapshot: Snapshot, frame: float, detail: De
 
 
 def _weights(renderer: Renderer, request: Request) -> list[np.ndarray]:
-    """Return the pictures (h, w) for --weights: how much of each shutter pixels get, then the mattes of layers.
+    """Return the pictures (h, w) for the option --weights: the share of each shutter, then the matte of each layer.
 
-    Each has a pixel for each block of the picture's pixels that share this.
+    Each has one pixel for each block of the picture's pixels that are exposed alike.
     """
     block = request.state.options.aggregate
     mattes = [block_means(matte, block) for matte in renderer.layer_mattes(request)]
@@ -82,7 +82,7 @@ def _write_weights(place: Path, snapshot: Snapshot, frame: float, weights: list[
 
 
 def shortages(renderer: Renderer, snapshot: Snapshot, request: Request) -> Iterator[str]:
-    """Yield warnings about a picture: what may be wrong (`unread`), and that too little GPU memory makes it slow."""
+    """Yield warnings about a picture: those of `unread`, and that too little GPU memory makes it slow."""
     yield from unread(snapshot, request)
     if renderer.is_short:
         source = renderer.source
@@ -118,7 +118,7 @@ def resized(picture: np.ndarray, width: int, height: int, divisor: int = 1) -> n
     """Return a picture (H, W, 4) at the size that Blender asks for, which is smaller with a resolution below 100 %.
 
     Args:
-        divisor: How many times smaller than the source it was composed; its pixels are repeated first.
+        divisor: How many times smaller than the source the picture was composed; its pixels are repeated first.
     """
     if divisor > 1:
         picture = picture.repeat(divisor, axis=0).repeat(divisor, axis=1)[:height, :width]

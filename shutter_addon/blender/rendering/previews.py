@@ -134,7 +134,7 @@ looking = _Looking()
 
 
 def for_engine(context: Context, effect_scene: Scene) -> Decision | None:
-    """Return what the engine has to make while Blender draws a preview; None: it is not asked for a preview.
+    """Return what the engine has to make while Blender draws a preview; None: the picture is not for a preview.
 
     Raises:
         effect_source.FAULTS: The effect cannot be shown.
@@ -159,7 +159,7 @@ def for_engine(context: Context, effect_scene: Scene) -> Decision | None:
 
 
 def take_decision() -> Decision | None:
-    """Return what for_engine decided for this redraw, once; None: Blender did not have to ask the engine."""
+    """Return what for_engine decided for this redraw, and forget it; None: Blender has not asked the engine."""
     decision, looking.decision = looking.decision, None
     return decision
 
@@ -169,7 +169,7 @@ def for_drawing(context: Context, shown: Shown, decision: Decision | None) -> Dr
 
     Args:
         shown: The effect strip that the preview shows.
-        decision: What for_engine decided, which holds unless the effect has changed since; None: it was not asked.
+        decision: What for_engine decided, which holds unless the effect has changed since; None: nothing was decided.
 
     Raises:
         effect_source.FAULTS: The effect cannot be shown.
@@ -215,7 +215,7 @@ def _snapshot(shown: Shown) -> Snapshot:
 
 
 def _requested(context: Context, shown: Shown, snapshot: Snapshot, look: Look) -> tuple[Request, bool]:
-    """Return, as _best, the request in the detail of previews or, with *Full Quality*, in full detail.
+    """Return what _best returns, in the detail of previews or, while *Full Quality* is on, in full detail.
 
     *Full Quality* ends here when another frame is shown or the effect has changed.
     """
@@ -231,9 +231,9 @@ def _requested(context: Context, shown: Shown, snapshot: Snapshot, look: Look) -
 
 
 def _best(context: Context, snapshot: Snapshot, frame: float, detail: effect_source.Detail) -> tuple[Request, bool]:
-    """Return the request for a picture that also exposes moments between frames if that is ready, else without them.
+    """Return the request for a picture with moments between frames, or without them while that is not ready.
 
-    The second value tells whether the picture with moments follows.
+    The second value tells whether the picture is without moments and one with them follows.
     """
     render = sessions.of_drawing()
     if not is_read(context) and detail.smooth:
@@ -257,7 +257,7 @@ def _detail(context: Context, look: Look) -> effect_source.Detail:
 
 
 def _is_drawn(context: Context, shown: Shown, look: Look, source: FrameSource, *, is_less: bool) -> bool:
-    """Tell whether our draw handler shows the picture instead of Blender, which it may where both look the same.
+    """Tell whether our draw handler shows the picture instead of Blender, which is allowed where both look the same.
 
     A still picture of full size is left to Blender, because what the handler draws has only 8 bits.
 
@@ -279,9 +279,9 @@ def _drafted(context: Context, shown: Shown, request: Request) -> Request:
 
 
 def draft(request: Request, source: FrameSource) -> Request:
-    """Return the request in coarser blocks of pixels where shutters follow edges, for speed.
+    """Return a request for a faster draft: if shutters follow edges, they do so in coarser blocks of pixels.
 
-    The blocks are at most DRAFT_ROWS along the picture's shorter side.
+    There are at most DRAFT_ROWS blocks along the picture's shorter side.
     """
     options = request.state.options
     if not options.edge_aware:
@@ -298,9 +298,9 @@ def _is_rendered(shown: Shown) -> bool:
 
 
 def _time_up(context: Context, request: Request) -> Slice:
-    """Return a function that tells, once it returns True, that Blender has to handle events before the picture goes on.
+    """Return a function that returns True once making the picture has to pause, so that Blender can handle events.
 
-    The picture goes on in the next redraw.
+    Making the picture goes on in the next redraw.
     """
     key = request.key
     if _is_playing(context):
@@ -310,7 +310,9 @@ def _time_up(context: Context, request: Request) -> Slice:
 
 
 def refine() -> None:
-    """Go on with pictures that also expose moments between frames, which will replace those that are drawn.
+    """Work for a moment on pictures with moments between frames, which will replace those that are drawn now.
+
+    Pause this work while the pen is down or while a slow picture is being made.
 
     Raises:
         effect_source.FAULTS: One cannot be made.
@@ -322,7 +324,7 @@ def refine() -> None:
 
 
 def show_carried() -> None:
-    """Have previews drawn again after mattes of outlines were tracked."""
+    """Close the renderers of previews and draw previews again, after mattes of outlines were tracked."""
     sessions.SESSIONS.window.keep(set())
     strips.invalidate_all()
     preview_areas.redraw()

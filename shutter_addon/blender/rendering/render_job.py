@@ -118,7 +118,7 @@ job = _Job()
 
 
 def say_once(text: str, to: Callable[[str], None]) -> None:
-    """Call `to` with a sentence, unless it was said before."""
+    """Call `to` with a sentence for the user, unless the same sentence was said before."""
     if text not in job.said:
         job.said.add(text)
         to(text)
@@ -128,8 +128,8 @@ def begin(scene: Scene) -> bool:
     """Note that a render begins.
 
     Returns:
-        Whether it is the user's render, of a film or a picture. It is not if an effect is rendered for one, or a
-        preview.
+        Whether it is a render that the user started, of a film or a picture. False: Blender renders an effect scene for
+        such a render, or for a preview.
     """
     is_effect = scene.render.engine == ENGINE
     if job.film is not None and (job.begun or is_effect):
@@ -163,7 +163,7 @@ def end(scene: Scene, alone: bool) -> None:
     with 1.
 
     Args:
-        alone: Whether no Python code waits for it.
+        alone: Whether no script waits for the render.
     """
     if scene.session_uid == job.film:
         job.film = None
@@ -178,7 +178,7 @@ def end(scene: Scene, alone: bool) -> None:
 def ends_films() -> bool:
     """Tell whether an error here has to end a whole render: in the background, on a job's thread, or in a script.
 
-    Otherwise the error is in a preview.
+    Otherwise (False), it only concerns a preview.
     """
     if where() is not Where.WINDOW:
         return True
@@ -186,7 +186,9 @@ def ends_films() -> bool:
 
 
 def script_waits(call_frame: FrameType | None) -> bool:
-    """Tell whether a script, through an operator, waits for what Blender does now. Blender has no API for that.
+    """Tell whether a script, through an operator, waits for what Blender does now.
+
+    The Python call stack tells, since Blender has no API for this.
 
     Args:
         call_frame: inspect.currentframe() of the function that Blender has called.
@@ -195,7 +197,7 @@ def script_waits(call_frame: FrameType | None) -> bool:
 
 
 def where() -> Where:
-    """Return in which situation Blender calls the extension now."""
+    """Return in which situation Blender calls the extension now: in the background, in the window, or on a thread."""
     if bpy.app.background:
         return Where.BACKGROUND
     if threading.current_thread() is threading.main_thread():
@@ -211,7 +213,7 @@ def operators_running() -> set[str]:
 
 @contextmanager
 def calling(handlers: list, function: Callable) -> Iterator[None]:
-    """Add a function to one of the lists of bpy.app.handlers within a `with` block."""
+    """Add a function to one of the lists of bpy.app.handlers within a `with` block, and remove it afterwards."""
     handlers.append(function)
     try:
         yield
@@ -232,10 +234,10 @@ def on_main_thread(function: Callable[[], T], ended: Callable[[], bool] | None =
     """Have Blender's main thread call a function, and return the result.
 
     Args:
-        ended: Tells whether the result is no longer wanted; None: wait for _LONG seconds at most.
+        ended: Called to tell whether the result is no longer wanted; None: wait for _LONG seconds at most.
 
     Returns:
-        None if it is no longer wanted before the call begins.
+        The function's result; None: the wait ended before the call began, and the function is not called.
     """
     if where() is not Where.JOB:
         return function()
@@ -250,7 +252,7 @@ def on_main_thread(function: Callable[[], T], ended: Callable[[], bool] | None =
 
 
 def soon(function: Callable[[], None]) -> None:
-    """Have a function called on the main thread: at once if this is it, else when it next can, without waiting."""
+    """Have a function called on the main thread, without waiting for it; on the main thread, call it at once."""
     if where() in (Where.JOB, Where.WAITED_FOR):
         main_thread.soon(function)
     else:
@@ -258,12 +260,12 @@ def soon(function: Callable[[], None]) -> None:
 
 
 def stopping() -> bool:
-    """Tell whether the film that this picture is for was stopped, or has failed."""
+    """Tell whether the picture being made is for a render that was stopped or has failed. False for previews."""
     return job.film is not None and ends_films() and (job.stopping or job.failure is not None)
 
 
 def fail(text: str) -> None:
-    """Note a sentence about why the running render has to end, and tell the user. Only the first one counts."""
+    """Note a sentence about why the running render has to end, and tell the user. Ignore all but the first sentence."""
     if job.failure is None:
         job.failure = text
         job.tell(text)
@@ -276,7 +278,7 @@ def cancel(ended: Callable[[], bool] | None = None) -> None:
     next, and crash.)
 
     Args:
-        ended: Tells whether the window has ended the render meanwhile; None: wait for some seconds at most.
+        ended: Called to tell whether the window has ended the render meanwhile; None: wait for _LONG seconds at most.
     """
     if where() is Where.JOB:
         on_main_thread(_cancel_and_show, ended)
@@ -330,9 +332,12 @@ def _cancel() -> None:
 
 
 def _remove_spent() -> float | None:
-    """Remove the scenes and objects that _cancel has made, once the render has ended. Also a timer of Blender.
+    """Remove the scenes and objects that _cancel has made, once the render has ended. Works as a timer of Blender.
 
-    During the render, Blender would free data of other effects in the same frame along with it, and crash.
+    During the render, Blender would free data of other effects in the same frame along with them, and crash.
+
+    Returns:
+        Seconds until the next try, for the timer; None: all is removed.
     """
     if bpy.app.is_job_running("RENDER"):
         return _PATIENCE

@@ -12,7 +12,7 @@ from .render_job import job
 
 
 def using(**settings: object) -> AbstractContextManager[None]:
-    """Let a command's options, by name of _Job's attributes, apply to renders within a `with` block."""
+    """Let a command's options (attributes of render_job.job, by name) apply to renders within a `with` block."""
     return for_a_while((job, name, value) for name, value in settings.items())
 
 
@@ -22,12 +22,12 @@ def wanted() -> str:
 
 
 def _wanted_memory() -> int:
-    """Return how many megabytes of GPU memory a command or the user allows textures; 0: devices.device decides."""
+    """Return how many megabytes of GPU memory a command or the user allows textures; 0: an automatic limit."""
     return preferences.gpu_memory() if job.gpu_memory is None else job.gpu_memory
 
 
 def memory() -> Budget:
-    """Return the budget of GPU memory that all sessions share: the wanted one, or a part of the GPU's memory."""
+    """Return the budget of GPU memory that all sessions share: the limit that is set, or else an automatic one."""
     if job.budget is None:
         megabytes = _wanted_memory()
         known = available.opengl().memory if not megabytes and wanted() in ("auto", "gpu", "opengl") else None
@@ -36,7 +36,7 @@ def memory() -> Budget:
 
 
 def forget_memory_if_changed() -> bool:
-    """Forget the budget if the user wants another limit now. Return whether that is so."""
+    """Forget the budget of GPU memory if its limit was changed in the settings. Return whether it was."""
     if job.budget is None or job.budget[0] == _wanted_memory():
         return False
     job.budget = None

@@ -52,7 +52,7 @@ class Work(NamedTuple):
         self.future.cancel()
 
     def result(self) -> Any:
-        """Wait for the result and return it. Break the work off if that is no longer wanted.
+        """Wait for the result and return it. Break the work off if the result is no longer wanted.
 
         Raises:
             StoppedError, NoDeviceError: As in result_of.
@@ -65,11 +65,11 @@ class Work(NamedTuple):
 
 
 def result_of(future: Future[T]) -> T:
-    """Wait for a future and return its result. On the window's main thread, make calls of other threads meanwhile.
+    """Wait for a future and return its result. On the window's main thread, serve calls from other threads.
 
     Raises:
-        StoppedError: It is no longer wanted (stopping.once).
-        NoDeviceError: It waits for Blender's GPU, which cannot be used now, so waiting would never end.
+        StoppedError: The result is no longer wanted (stopping.once).
+        NoDeviceError: The work needs Blender's GPU, which cannot be used now, so waiting would never end.
     """
     is_window = where() is Where.WINDOW
     while not wait([future], 0 if is_window else _PATIENCE).done:
@@ -80,7 +80,7 @@ def result_of(future: Future[T]) -> T:
 
 
 def broken_off(stopped: Callable[[], bool], function: Callable[..., T], *arguments: object) -> T:
-    """Return a function's result. It raises StoppedError at its next step once `stopped()` is true."""
+    """Call a function and return its result. It raises StoppedError at its next step once `stopped()` returns True."""
     with stopping.once(stopped):
         return function(*arguments)
 
@@ -105,7 +105,7 @@ class RenderContext:
         """Return the request for an effect strip's picture at a timeline frame: what it depends on, as plain data.
 
         Args:
-            detail: How detailed; None: as the last picture was, where no picture will be made.
+            detail: The picture's detail; None: that of the effect's last picture, if only its data are needed.
 
         Raises:
             effect_source.FAULTS: The effect cannot be shown.
@@ -157,7 +157,7 @@ class RenderSession:
 
     @property
     def device(self) -> str:
-        """The device, a key of available.OPEN. It is chosen once, until `forget`.
+        """The device's name, a key of available.OPEN. The device is chosen once, and again only after `forget`.
 
         Raises:
             NoDeviceError: The wanted device is missing.
@@ -174,13 +174,13 @@ class RenderSession:
     def run(self, function: Callable[..., T], *arguments: object) -> T:
         """Call a function that uses the device, wait for its turn, and return its result.
 
-        It is not given up where the picture being made is no longer wanted.
+        The call goes on even if the picture being made is no longer wanted.
         """
         with stopping.once(stopping.never):
             return self._submit(function, *arguments).result()
 
     def _submit(self, function: Callable, *arguments: object) -> Work:
-        """Have a function that uses the device called, after earlier ones on the device's thread, or here at once."""
+        """Queue a function on the device's thread, or call it here at once if the device has none."""
         ended = threading.Event()
         if self.threaded:
             with suppress(RuntimeError):  # at Python's exit, threads take no more work
@@ -208,7 +208,7 @@ class RenderSession:
     def begin_next(self, snapshot: Snapshot, frame: float, context: RenderContext) -> None:
         """Begin the picture of a film's next frame, if the last two pictures were of successive frames.
 
-        It is used only if exactly this picture is asked for next.
+        The result is used only if exactly this picture is asked for next. Does nothing on a device without a thread.
 
         Args:
             frame: Timeline frame of the last picture.
@@ -258,10 +258,10 @@ class RenderSession:
         return known[1] if known and known[0] == key else None
 
     def _opened(self, say: Say) -> Any:
-        """Return the compositor, opened if necessary.
+        """Return the compositor, which composes pictures on the device, opened if necessary.
 
         Args:
-            say: Called with why it is on a lesser device than wanted.
+            say: Called with a sentence about why the device is a lesser one than wanted.
         """
         if self._compositor is None:
             with stopping.once(stopping.never):
@@ -275,7 +275,7 @@ class RenderSession:
             raise
 
     def _ask(self) -> None:
-        """Have other sessions free their GPU memory. This session's is in use and stays."""
+        """Have other sessions free their GPU memory. Keep that of this session, which is in use."""
         self._frees_others = True
         try:
             self._ask_others()
@@ -283,14 +283,14 @@ class RenderSession:
             self._frees_others = False
 
     def free(self) -> None:
-        """Free the renderers' GPU memory, unless this session itself asks for room. They load frames again later."""
+        """Free the renderers' GPU memory, unless this session itself asks others for room. Frames load again later."""
         if self._frees_others:
             return
         for _key, renderer in list(self._renderers.values()):
             self.run(renderer.release)
 
     def rest(self) -> None:
-        """Stop making the next picture and reading frames ahead."""
+        """Stop making a film's next picture and reading frames ahead. Renderers stay open."""
         self._drop_begun(list(self._begun))
         for _key, renderer in list(self._renderers.values()):
             renderer.source.want(())

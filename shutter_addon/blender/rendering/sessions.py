@@ -35,13 +35,16 @@ class _Sessions(NamedTuple):
 
 
 def _ask_window() -> None:
-    """On a job's thread, free the GPU memory of the window's previews, which load frames again when drawn."""
+    """Have the window's previews free their GPU memory, if called on a render job's thread.
+
+    They load frames again when they are drawn.
+    """
     if render_job.where() is Where.JOB:
         main_thread.ask(SESSIONS.window.free, _ANSWER)
 
 
 def _ask_offscreen() -> None:
-    """Free GPU memory for previews: what finished renders keep for the next render, unless one is running."""
+    """Free the GPU memory that finished renders keep for the next one, unless a render is running."""
     if not render_job.runs():
         SESSIONS.offscreen.free()
 
@@ -83,7 +86,10 @@ def of_render(say: Say = print, *, levels: bool = False, display: Display | None
 
 
 def close_if_device_changed() -> None:
-    """Close sessions whose device or memory is not what the user wants now. On the main thread, before a render."""
+    """Close sessions of renders whose device has changed, and all sessions if the memory limit has.
+
+    Called on the main thread before a render. `waited_for` is always closed.
+    """
     if render_settings.forget_memory_if_changed():
         forget()
     SESSIONS.waited_for.forget()  # its frames take main memory
@@ -91,7 +97,7 @@ def close_if_device_changed() -> None:
 
 
 def end_job() -> None:
-    """After a render, stop making pictures ahead and forget snapshots. Renderers stay open for the next render."""
+    """Stop making pictures ahead after a render, and forget its requests. Renderers stay open for the next render."""
     if render_job.where() is Where.JOB:
         SESSIONS.offscreen.rest()
     SESSIONS.offscreen.requests.clear()

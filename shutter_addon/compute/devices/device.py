@@ -247,20 +247,20 @@ class Device:
         self._dispatch(program, program.groups(extent), *own, blocks or {}, constants)
 
     def use(self, release: Callable[[], None]) -> None:
-        """Note that a window is in use. If memory is short, those whose use is longest ago are freed first.
+        """Mark a window as the one in use. If memory is short, the others are freed, the least recently used first.
 
         Args:
-            release: Frees the window.
+            release: The function that frees the window.
         """
         self.forget(release)
         self._windows[release] = None
 
     def forget(self, release: Callable[[], None]) -> None:
-        """Note that the window that `release` frees was freed."""
+        """Stop keeping track of a window that was freed. `release`: the function that was given to `use`."""
         self._windows.pop(release, None)
 
     def release(self) -> None:
-        """Free the device, at any time. Its textures have to be released by themselves."""
+        """Free the device, at any time. This does not release its textures: release each of them, too."""
         raise NotImplementedError
 
     def bring(self, textures: Iterable[Texture]) -> None:
@@ -283,7 +283,7 @@ class Device:
             self._held[texture] = None
 
     def drop(self, texture: Texture) -> None:
-        """Free the device's memory of a texture."""
+        """Free a texture's memory on the device, and the content there. Content on the host stays."""
         if texture.own is not None:
             own, texture.own = texture.own, None
             self._held.pop(texture, None)
@@ -291,10 +291,10 @@ class Device:
             self.budget.give_back(texture.bytes)
 
     def _made(self, texture: Texture, beside: tuple[Texture, ...]) -> Own:
-        """Return a new texture of the graphics library for a texture, and make room for it if necessary.
+        """Allocate a texture with the graphics library, within the budget. Free other memory if necessary.
 
         Args:
-            texture: The texture.
+            texture: Its size and format.
             beside: Textures that must stay on the device.
 
         Raises:
@@ -315,10 +315,13 @@ class Device:
         )
 
     def _make_room(self, beside: tuple[Texture, ...]) -> bool:
-        """Free some memory: of other devices, of a texture that is not in `beside`, or of a window that is not in use.
+        """Free some memory: of other devices, else of a texture (moved to the host), else of a window not in use.
+
+        Args:
+            beside: Textures that must stay on the device.
 
         Returns:
-            Whether there was anything to free.
+            False if there was nothing to free.
         """
         used = self.budget.used
         if self.ask_others is not None and used > sum(texture.bytes for texture in self._held):

@@ -37,7 +37,10 @@ _FREE_MEMORY = 0x87FC
 
 @contextmanager
 def _kept_context() -> Iterator[None]:
-    """Make the thread's OpenGL context current again at the end. On EGL, moderngl leaves the thread without one."""
+    """Restore the thread's current OpenGL context when the `with` block ends.
+
+    On EGL, moderngl leaves the thread without one. Elsewhere this does nothing.
+    """
     if not _EGL:
         yield
         return
@@ -82,7 +85,8 @@ def _gl(name: str) -> Callable[..., Any]:
 def _memory(context: moderngl.Context, renderer: str) -> int | None:
     """Return the bytes of memory of the current context's GPU, or None if the driver does not tell.
 
-    If only the free memory is known, it is the power of two below that, to be the same at the next start.
+    For llvmpipe, this is the machine's main memory. If only the free memory is known, it is rounded down to a power of
+    two, to be the same at the next start.
     """
     if is_llvmpipe(renderer):
         return machine_memory()

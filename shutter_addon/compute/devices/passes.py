@@ -100,7 +100,11 @@ def read_pass(file: str, step: str = "", **defines: int | str) -> Pass:
 
 
 def _declared(program: Pass, line: str) -> str:
-    """Add what a line of GLSL declares to a pass. Return the line with binding points, or "" if it declares nothing."""
+    """Note in a pass what a line of GLSL declares, such as images and uniforms.
+
+    Returns:
+        The line, with binding points where it needs them; "" if it declares nothing.
+    """
     defines, samplers, images = program.defines, len(program.samplers), len(program.images)
     if found := _LOCAL_SIZE.fullmatch(line):
         program.local_size = int(found[1]), int(found[2] or 1), 1
@@ -156,7 +160,7 @@ def _live(path: Path, macros: Mapping[str, int | str]) -> Iterator[str]:
 
 
 def _holds(condition: str, macros: Mapping[str, int | str]) -> bool:
-    """Return whether the condition of an #if holds for some macros."""
+    """Return whether the condition of an #if, terms joined by && and ||, holds for macros {name: value}."""
     return any(all(_is(term, macros) for term in terms.split(" && ")) for terms in condition.split(" || "))
 
 

@@ -96,7 +96,7 @@ class CarriedMattes(SourceWrapper):
         return None if near == (None, None) else self._described(self._path(index, *near))
 
     def _described(self, path: Path) -> float | None:
-        """Return the confidence, 0 to 1, that a matte's file states; None: it is missing, or of another program."""
+        """Read the confidence, 0 to 1, from a matte's file; None: it is missing, or not written by this program."""
         if (image := derived.opened(path, self._spec)) is None:
             return None
         with closing(image):
@@ -110,9 +110,8 @@ class CarriedMattes(SourceWrapper):
         """Return the outline's curves at a frame, in fractions of the picture.
 
         Returns:
-            The drawing, if there is one at this frame. Otherwise the curves around the matte or, while the matte is not
-            kept
-            yet, curves that move straight from drawing to drawing.
+            The drawing, if there is one at this frame. Otherwise the curves around the matte or, while no
+            matte is kept yet, curves that move straight from drawing to drawing.
 
         Raises:
             MediaError: The matte cannot be read.
@@ -199,7 +198,7 @@ class CarriedMattes(SourceWrapper):
         return (first if first in shot else None), (last if last in shot else None)
 
     def _made(self, index: int, first: int | None, last: int | None) -> Iterator[carrying.Carried]:
-        """Yield the mattes that are made together with a frame's (`_span`).
+        """Make the matte of a frame and those made together with it (`_span`), and yield them.
 
         Args:
             index: The frame.
@@ -263,7 +262,7 @@ class CarriedMattes(SourceWrapper):
         return np.zeros((self.height, self.width), np.float32)
 
     def _path(self, index: int, first: int | None, last: int | None) -> Path:
-        """Return the file of a frame's matte that is made from the drawings at the frames `first` and `last`."""
+        """Return the path of the file for a frame's matte that is made from the drawings at `first` and `last`."""
         key = derived.key({"version": VERSION, "frame": index, "drawn": self._drawn(first, last)})
         name = f"{index:08d}-{key}.png"
         if self._parent and derived.size_of(kept := self._parent / self._folder / name) is not None:
@@ -279,7 +278,7 @@ class CarriedMattes(SourceWrapper):
         return f"{self.path.stem[:40]}-{derived.key(derived.identity(self._source))}"
 
     def _kept(self, path: Path) -> np.ndarray | None:
-        """Return the matte (H, W) uint8 in a file; None: it is missing, damaged or not written by this program."""
+        """Read the matte (H, W) uint8 in a file; None: the file is missing, damaged or not written by this program."""
         samples = derived.read(path, self._spec, CONFIDENCE)
         return None if samples is None else samples[..., 0]
 

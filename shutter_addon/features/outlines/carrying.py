@@ -166,12 +166,12 @@ class _Footage:
         self.colors[frame], self.greys[frame] = lab(picture), cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
 
     def to(self, frame: int, other: int) -> Places:
-        """Return the place in the frame `other` that matches each pixel of `frame`, by optical flow."""
+        """Find for each pixel of `frame` the matching place in the frame `other`, by optical flow."""
         grey = self.greys[frame]
         return flow.grid(*grey.shape) + flow.fine_vectors(grey, self.greys[other])
 
     def best(self, joined: Places, frame: int, end: Drawing) -> Places:
-        """Return the place in a drawing's frame that matches each pixel of a frame best.
+        """Find for each pixel of a frame the best matching place in a drawing's frame.
 
         Several candidates are compared by color: joined flow, flow between the two frames alone, and the affine motions
         of the background and of the subject. Joined flow counts unless another one is clearly better (BETTER).
@@ -194,7 +194,7 @@ class _Footage:
 
 
 def stillness(moved: np.ndarray, colors: np.ndarray, before: np.ndarray) -> np.ndarray:
-    """Return how much of the last frame's matte each pixel keeps, (h, w), 0 to QUIET, so that mattes do not flicker.
+    """Return which share of the last frame's matte each pixel keeps, (h, w), 0 to QUIET, so that mattes do not flicker.
 
     Where nothing moves and colors stay, any difference between mattes is noise.
 
@@ -334,7 +334,7 @@ def _confidence(share: np.ndarray, sides: list[Votes]) -> float:
 
 
 def refined(picture: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Make a matte of votes and fit it to the edges and colors of the whole picture (steps 3 and 4 above).
+    """Make a matte of votes, and fit it to the edges and colors of the whole picture (guided filter, soft edges).
 
     Args:
         picture: (H, W, 3) uint8.
@@ -396,7 +396,7 @@ def lab(picture: np.ndarray) -> np.ndarray:
 
 
 def _at(values: np.ndarray, places: Places) -> np.ndarray:
-    """Return the values at some places in a picture. Beyond the picture, its edge repeats.
+    """Look up a picture's values at some places, between its pixels, too. Beyond the picture, its edge repeats.
 
     Args:
         values: (h, w), (h, w, 2) or planes (3, h, w).

@@ -123,7 +123,7 @@ class Network:
         return np.clip(cv2.resize(mask, picture.shape[1::-1], interpolation=cv2.INTER_LINEAR), 0, 1)
 
     def within(self, picture: np.ndarray, box: Box, share: float = 1.0) -> np.ndarray:
-        """Return its answer for the part of a picture inside a box; 0 outside. Arguments as in `answer`."""
+        """Return the network's answer for the part of a picture inside a box; 0 outside. Arguments as in `answer`."""
         found = np.zeros(picture.shape[:2], np.float32)
         found[box] = self.answer(np.ascontiguousarray(picture[box]), share)
         return found
@@ -133,7 +133,7 @@ class Network:
 
 
 def refined(picture: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Make a matte of how sure pixels are, and fit it to the edges of the whole picture.
+    """Make a matte from how sure pixels belong to a subject, and fit it to the edges of the whole picture.
 
     Args:
         picture: (H, W, 3) uint8.
@@ -147,7 +147,7 @@ def refined(picture: np.ndarray, share: np.ndarray) -> np.ndarray:
 
 
 def covered(strokes: Sequence[Any], picture: np.ndarray) -> np.ndarray:
-    """Return which pixels of a picture strokes of the width WIDTH cover, (h, w) bool.
+    """Return which pixels of a picture are covered by strokes, drawn with the width WIDTH, (h, w) bool.
 
     Args:
         strokes: Points (n, 2) of each, in fractions of the picture.
@@ -163,7 +163,7 @@ def found(network: Network, picture: np.ndarray, on: np.ndarray, off: np.ndarray
     Args:
         picture: (h, w, 3) uint8.
         on: (h, w) bool, the pixels that strokes on the subject cover.
-        off: (h, w) bool, the pixels that strokes on what it is not cover.
+        off: (h, w) bool, the pixels that strokes beside the subject cover: what does not belong to it.
     """
     if not on.any():
         return None
@@ -187,7 +187,7 @@ def found(network: Network, picture: np.ndarray, on: np.ndarray, off: np.ndarray
 def _sure(share: np.ndarray, on: np.ndarray, box: Box) -> float:
     """Return how sure the network is of what it found under strokes, 0 to 1.
 
-    It is 0 if that covers too little of the strokes or nearly the whole picture, and less where the box cuts it off.
+    It is 0 if the find covers too little of the strokes or nearly the whole picture, and less if the box cuts it off.
 
     Args:
         share: The network's answer, (h, w).
@@ -205,7 +205,7 @@ def _sure(share: np.ndarray, on: np.ndarray, box: Box) -> float:
 
 
 def _confidence(share: np.ndarray, sure: float, agrees: float = 1.0) -> float:
-    """Return how sure a subject is, 0 to 1: less if the network is unsure, motion disagrees, or it is small.
+    """Return a subject's confidence, 0 to 1: less if the network is unsure, motion disagrees, or the subject is small.
 
     Args:
         share: (h, w), how sure each pixel belongs to it.
@@ -222,10 +222,10 @@ def _from(value: float, ends: tuple[float, float]) -> float:
 
 
 def without(subject: Found, picture: np.ndarray, on: np.ndarray, off: np.ndarray) -> Found:
-    """Remove from a subject what strokes mark as not belonging to it, and return the rest.
+    """Remove from a subject what strokes (`off`) mark as not belonging to it, and return the rest.
 
-    If they touch a separate part that is smaller than the rest, all of that part is removed. Otherwise what is removed
-    is what lies on their side of the picture's edges between them and the strokes on the subject.
+    If these strokes touch a separate part that is smaller than the rest, all of that part is removed. Otherwise the
+    part is divided along the picture's edges between `off` and `on`, and the side of `off` is removed.
 
     Args:
         picture: (h, w, 3) uint8.
@@ -251,7 +251,7 @@ def without(subject: Found, picture: np.ndarray, on: np.ndarray, off: np.ndarray
 
 
 def _near(where: np.ndarray) -> np.ndarray:
-    """Return the pixels of an area (h, w) bool, and those up to SOFT pixels beside it."""
+    """Widen an area (h, w) bool by SOFT pixels on all sides."""
     return cv2.dilate(where.astype(np.uint8), np.ones((2 * SOFT + 1,) * 2, np.uint8)) > 0
 
 
@@ -274,13 +274,13 @@ def followed(network: Network, before: np.ndarray, picture: np.ndarray, subject:
     """Follow a subject to the next frame of a chain: carry it there by motion, and correct it by the network.
 
     Args:
-        before: The frame where it is known, (h, w, 3) uint8.
+        before: The frame where the subject is known, (h, w, 3) uint8.
         picture: The next frame, (h, w, 3) uint8.
-        subject: What it is in the frame `before`.
+        subject: The subject in the frame `before`.
 
     Returns:
-        The subject in the next frame, and how much of the matte before each pixel keeps, (h, w), as in
-        carrying.stillness.
+        The subject in the next frame, and which share of its matte in `before` each pixel keeps, (h, w), so that
+        mattes do not flicker (carrying.stillness).
     """
     greys = [cv2.cvtColor(each, cv2.COLOR_RGB2GRAY) for each in (before, picture)]
     grid = flow.grid(*subject.share.shape)
@@ -355,7 +355,7 @@ class MarkedSubject:
 
     Attributes:
         strokes: On the subject, by frame of the footage. Sequences of arrays (n, 2) become outlines.Curves.
-        nots: On what it is not, likewise.
+        nots: Strokes on what does not belong to it, by frame of the footage.
     """
 
     strokes: Strokes = field(hash=False)
@@ -443,13 +443,14 @@ class SubjectMattes(CarriedMattes):
         return sum(share * sure for _path, share, sure in sides)
 
     def _sides(self, index: int, *, makes: bool = False) -> list[tuple[Path, float, float]] | None:
-        """Return the files that a frame's matte is mixed of: from the chains of the keyframes on both sides.
+        """Return the files that make up a frame's matte, from the chains that begin at the keyframes on both sides.
 
         Args:
             makes: Make what is missing.
 
         Returns:
-            For each chain the file, its share of the matte and its confidence, both 0 to 1; None: a file is missing.
+            For each chain the file, its share of the matte, 0 to 1, and its confidence: 0 to 1, or GONE behind a cut.
+            None: a file is missing.
         """
         ends = sorted({end for end in self._near(index) if end is not None}, key=lambda end: abs(end - index))
         span = sum(abs(end - index) for end in ends)
@@ -470,11 +471,11 @@ class SubjectMattes(CarriedMattes):
         return [(path, weight / total, sure) for path, weight, sure in sides]
 
     def _sure(self, index: int, end: int) -> float | None:
-        """Return the confidence of a frame's matte in the chain of the keyframe `end`; None: it is not kept."""
+        """Return the confidence of a frame's matte in the chain from the keyframe `end`; None: no file keeps it."""
         return self._described(self._path(index, end, None))
 
     def _make(self, index: int, end: int) -> None:
-        """Make the mattes of a chain from its keyframe `end` to a frame, after the last one that is kept."""
+        """Make and write those mattes of a chain, from its keyframe `end` to a frame, that no files keep yet."""
         step = 1 if index > end else -1
         start = index
         while start != end and self._sure(start, end) is None:
@@ -493,7 +494,7 @@ class SubjectMattes(CarriedMattes):
         write_levels(self._path(frame, end, None), levels, f"{CONFIDENCE}{sure:.3f}")
 
     def _first(self, frame: int) -> tuple[np.ndarray, np.ndarray, float]:
-        """Make the matte of a keyframe, with which a chain begins.
+        """Make the matte of a keyframe (with strokes or a drawing), at which a chain of mattes begins.
 
         Returns:
             The matte (H, W), what is excluded from it (h, w), and its confidence, 0 to 1.
@@ -537,14 +538,14 @@ class SubjectMattes(CarriedMattes):
         return found_there, what.excluded, min(what.confidence, self._sure(end, end) or 0.0)
 
     def _pictures(self, frame: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return a frame as displayed, (H, W, 3) uint8, and as working picture (h, w, 3). The last one is kept."""
+        """Return a frame as displayed, (H, W, 3) uint8, and reduced as working picture (h, w, 3)."""
         if self._before is None or self._before[0] != frame:
             picture = self._picture(frame)
             self._before = frame, picture, flow.resized(picture, carrying.working_size(self.width, self.height))
         return self._before[1:]
 
     def _carried_to(self, frame: int) -> Found:
-        """Return the subject in a frame that has only strokes on what it is not, as it would be without these."""
+        """Return the subject in a frame that has only strokes beside the subject, as it would be without them."""
         nots = {each: strokes for each, strokes in self._subject.nots.items() if each in self._showing}
         drawings, subject = tuple(self._drawings.items()), replace(self._subject, nots=nots)
         mattes = SubjectMattes(self._source, drawings, self._parent, subject, self._model)
@@ -563,10 +564,10 @@ class SubjectMattes(CarriedMattes):
 
 
 def mixed(mattes: list[tuple[np.ndarray, float]]) -> np.ndarray:
-    """Return the weighted mean (H, W) of one or two mattes, with steeper edges where they differ.
+    """Mix one or two mattes by a weighted mean (H, W), with steeper edges where the two differ.
 
     Args:
-        mattes: Each with its weight.
+        mattes: Each matte with its weight; weights add up to 1, or are all 0 for an empty result.
     """
     if len(mattes) == 1:
         return mattes[0][0] * np.float32(mattes[0][1] > 0)

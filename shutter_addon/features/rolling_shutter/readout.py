@@ -44,7 +44,7 @@ UNLIKE = "lines do not lean as one readout would have them"
 
 
 def of_source(source: FrameSource, indices: Sequence[int], *, columns: bool = False) -> float:
-    """Return the readout time of footage in frames; negative if the last row is read first.
+    """Measure how long the sensor takes to read all rows, in frames; negative: it reads the last row first.
 
     Args:
         source: The footage.
@@ -61,7 +61,7 @@ def of_source(source: FrameSource, indices: Sequence[int], *, columns: bool = Fa
 
 
 def of_pictures(pictures: Sequence[np.ndarray]) -> float:
-    """Return the readout time in frames, as of_source, from successive grey pictures (H, W) uint8.
+    """Measure the readout time in frames, as `of_source` does, from successive grey pictures (H, W) uint8.
 
     Raises:
         ReadoutError: It cannot be measured.
@@ -91,19 +91,19 @@ class _Edge:
     places: list[tuple[float, float]] = field(default_factory=list)
 
     def samples(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """Return its speeds in pixels per frame and leans in pixels per row, (n,) each; None: too few places."""
+        """Return the edge's speeds in pixels per frame and leans in pixels per row, (n,) each; None: too few places."""
         if len(self.places) < _SAMPLES + 2:
             return None
         x, lean = np.array(self.places).T
         return _speeds(x)[1:-1], lean[1:-1]
 
     def at(self, x: float, lean: float) -> np.ndarray:
-        """Return its x in each of its rows (n,), if it has this x in the middle row and this lean."""
+        """Return the edge's x in each of its rows (n,), from x in the middle row and the lean in pixels per row."""
         return x + lean * (self.rows - self.rows.mean())
 
 
 def _speeds(x: np.ndarray) -> np.ndarray:
-    """Return speeds (n,) in pixels per frame along the natural cubic spline through positions x (n,).
+    """Return speeds (n,) in pixels per frame along the natural cubic spline through an edge's x (n,) in each frame.
 
     With shaking hands, differences of neighbors would be too small by a fifth.
     """
@@ -151,7 +151,7 @@ def _follow(edge: _Edge, vectors: np.ndarray, steepness: np.ndarray) -> bool:
 
 
 def _new(seen: list[_Edge], picture: np.ndarray, steepness: np.ndarray) -> list[_Edge]:
-    """Return edges of a picture that are not among those seen already, the longest first.
+    """Find edges of a picture that do not coincide with those seen already, the longest first.
 
     Args:
         steepness: The picture's horizontal gradient.
@@ -187,7 +187,7 @@ def _is_same(edge: _Edge, place: tuple[float, float], other: _Edge) -> bool:
 
 
 def _segments(picture: np.ndarray) -> np.ndarray:
-    """Return nearly upright edges (n, 4), the longest first: x and y of their upper and lower ends."""
+    """Find nearly upright edges in a picture, the longest first, (n, 4): x and y of their upper and lower ends."""
     found = cv2.createLineSegmentDetector().detect(picture)[0]
     if found is None:
         return np.empty((0, 4))
@@ -199,7 +199,7 @@ def _segments(picture: np.ndarray) -> np.ndarray:
 
 
 def _placed(edge: _Edge, expected: tuple[float, float], steepness: np.ndarray) -> tuple[float, float] | None:
-    """Find an edge near an expected place, and return its x and lean; None: it is not visible.
+    """Find an edge near an expected place, and return its x in the middle row and its lean; None: it is not visible.
 
     Args:
         expected: x and lean, as in _Edge.places.
@@ -261,7 +261,7 @@ def _fitted(samples: list[tuple[np.ndarray, np.ndarray]], height: int) -> float:
         height: Rows of the pictures.
 
     Raises:
-        ReadoutError: It is not certain.
+        ReadoutError: The edges move too little, or do not agree on one readout time.
     """
     speeds, leans = (np.concatenate(part) for part in zip(*samples, strict=True))
     of = np.repeat(np.arange(len(samples)), [len(speed) for speed, _lean in samples])
@@ -285,7 +285,7 @@ def _fitted(samples: list[tuple[np.ndarray, np.ndarray]], height: int) -> float:
 
 
 def _without_mean(values: np.ndarray, weight: np.ndarray, of: np.ndarray) -> np.ndarray:
-    """Return values (n,) minus the weighted mean of the values of the same edge.
+    """Subtract from each value (n,) the weighted mean of all values of the same edge.
 
     Args:
         of: The edge's index for each value (n,).

@@ -77,7 +77,7 @@ class Repeats:
         return (first, stop) if is_repeated else (index, index + 1)
 
     def _change(self, index: int) -> float:
-        """Return by how many levels of 255 a frame differs from the one before.
+        """Return by how many levels of 255 a frame differs from the one before, where it differs most.
 
         Returns:
             Infinity if there is no frame before, or it belongs to another shot. NaN if a frame cannot be read.
@@ -176,13 +176,13 @@ class SmoothSource(SourceWrapper):
 
 
 def steps_for(source: FrameSource, smooth: int | str, window: int, *, skip_repeats: bool = False) -> int:
-    """Return how many steps (moments) lead from a frame of the footage to the next, for an effect's option *Smooth*.
+    """Return how many steps lead from a frame of footage to the next, for an effect's option *Smooth*; 1: no moments.
 
     Args:
         source: The footage.
         smooth: As frame_state.Options.step; "auto": as many as the fastest motion of a few pairs of frames needs.
-        window: Frames of its shutters, all of whose moments have to fit into shutters.MAX_WINDOW.
-        skip_repeats: As SmoothSource has it.
+        window: Frames of the effect's shutters. These times the steps must not exceed shutters.MAX_WINDOW.
+        skip_repeats: As in SmoothSource.
 
     Returns:
         One of SMOOTH.
@@ -260,12 +260,12 @@ def moved(source: FrameSource, index: int, other: int | None = None) -> Moved | 
 def step(moved: Moved, before: Similarity, after: Similarity) -> float:
     """Return how far the fastest part of a picture moves between two frames, relative to what the exposure follows.
 
-    That is the distance, in heights of the picture, that the fastest _SHARE of the points move at least.
+    The result is the distance, in heights of the picture, that the fastest _SHARE of the points exceed.
 
     Args:
         moved: The motion from one frame to the other.
         before: Takes points of the shown picture to their places in the first frame, in heights of the picture.
-        after: Likewise, to their places in the other frame.
+        after: Takes points of the shown picture to their places in the other frame.
     """
     ways = after.inverse()(moved.after) - before.inverse()(moved.before)
     return float(np.quantile(np.abs(ways), 1 - _SHARE))

@@ -52,7 +52,7 @@ class CameraTrack(tracking.Track):
         return self._begun.get(frame) or super()._placement(frame)
 
     def _onward(self, start: int, frames: range) -> Iterator[Tracked]:
-        """Track away from `start`, but after a fault go on where frames can be compared again, from the last placement.
+        """Yield where the camera is at frames on one side of `start`; after a fault, go on once frames can be compared.
 
         A cut alone is no fault, because no window goes across cuts.
         """
@@ -122,7 +122,7 @@ class _Pursuit:
     reason = UNLIKE
 
     def __init__(self, part_at: Callable[[int], Part], footage: Footage, frame: int, motion: Motion) -> None:
-        """Start at a frame.
+        """Start to follow the camera at a frame.
 
         Args:
             part_at: Returns what stands still in a frame, or raises TrackingError.
@@ -136,7 +136,7 @@ class _Pursuit:
         self._speed = Similarity()
 
     def next(self, frame: int) -> FoundMotion | None:
-        """Return the motion from the first frame to this one; None: it is not found."""
+        """Return the camera's motion from the frame where tracking starts to this one; None: it is not found."""
         picture, (before, known) = self._footage.picture(frame), self._last
         sighting = self._compared(picture, self.anchor)
         if sighting.confidence < _ANEW and before != self.anchor[1] and (anchor := self._anchor_at(before, known)):
@@ -167,9 +167,10 @@ class _Pursuit:
         return float(np.clip((_MOST - np.mean(astray)) / (_MOST - _FEW), 0, 1)) if astray else 1.0
 
     def _compared(self, picture: np.ndarray, anchor: tuple[Part, int, Similarity]) -> FoundMotion:
-        """Return the motion from the first frame to a picture, found by comparison with an anchor.
+        """Find the motion from the first frame to a picture, by comparison with an anchor frame.
 
-        The search starts where the camera would be at its last speed.
+        The search starts where the camera would be at its last speed. If nothing is found, the last motion is returned
+        with confidence 0.
         """
         (part, _, motion), known = anchor, self._last[1]
         match = part.find(picture, self._speed.after(known).after(motion.inverse()), self._motion)

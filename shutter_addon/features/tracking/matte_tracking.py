@@ -100,7 +100,7 @@ class _Pursuit:
         self._start, self._last, self._motion, self.reason = frame, frame, Similarity(), COVERED
 
     def next(self, frame: int) -> FoundMotion | None:
-        """Return the motion from the first frame to this one; None: the subject is not found."""
+        """Return the subject's motion from the frame where tracking starts to this one; None: it is not found."""
         before, after = (self._cover(each) for each in (self._last, frame))
         if not (after > _INSIDE).any():
             self.reason = LEFT
@@ -114,7 +114,7 @@ class _Pursuit:
         return FoundMotion(self._at_middle() if self._asked == "location" else self._motion, step.confidence)
 
     def _at_middle(self) -> Similarity:
-        """Return the motion as a movement alone: how the middle of what the first matte covers has moved."""
+        """Return the motion so far as a mere shift: how the middle of what the first matte covers has moved."""
         rows, columns = np.nonzero(self._cover(self._start) > _INSIDE)
         middle = complex(columns.mean(), rows.mean())
         return Similarity(1 + 0j, self._motion(middle) - middle)
@@ -142,7 +142,7 @@ class _Pursuit:
 def moved(
     first: np.ndarray, second: np.ndarray, before: np.ndarray, after: np.ndarray, motion: Motion
 ) -> FoundMotion | None:
-    """Return the motion of what a matte covers from one picture to another; None: it is unknown.
+    """Find the motion of what a matte covers from one picture to another; None: too little is certain.
 
     Args:
         first: Grey picture, (H, W) uint8.

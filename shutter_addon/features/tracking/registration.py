@@ -132,10 +132,10 @@ class Part:
         return None if likeness <= _NOWHERE else around.inverse().after(Similarity(1, complex(*best))).after(alone)
 
     def lookalike(self, picture: np.ndarray, known: Similarity) -> bool:
-        """Tell whether something elsewhere in a picture looks nearly as much like the part as its place there.
+        """Tell whether something elsewhere in a picture looks nearly as much like the part as its own place does.
 
         Args:
-            known: Motion to its place in this picture.
+            known: Motion to the part's place in this picture.
         """
         scores, _, _ = self._scores(picture, known, max(picture.shape))
         y, x = (length // 2 for length in scores.shape)
@@ -155,8 +155,7 @@ class Part:
 
         Returns:
             The correlations, with the known place in their middle and _NOWHERE outside the picture; and the motions to
-            the
-            reduced pictures of the part and of its surroundings.
+            the reduced pictures of the part and of its surroundings.
         """
         x, y, width, height = self.box
         middle = complex(x + width / 2, y + height / 2)
@@ -176,7 +175,7 @@ class Part:
         return np.where(fits, scores, np.float32(_NOWHERE)), alone, around
 
     def rival(self, radius: float) -> float:
-        """Return how much the part's surroundings look like it, 0 to 1. The more, the easier tracking slips onto them.
+        """Return how much the part's surroundings look like it, 0 to 1: how easily tracking slips onto them.
 
         It is the highest correlation with its own picture, displaced by up to `radius` pixels, outside the peak at no
         displacement; 0 if none is above ALIKE. Shading that is coarser than the windows does not count, since it does
@@ -210,12 +209,12 @@ class Part:
         return self.points[good], np.abs(moved - self.points)[good]
 
     def again(self, picture: np.ndarray, motion: Similarity) -> Part | None:
-        """Return the part as it looks in another picture, where `motion` takes it; None: it is outside."""
+        """Take the part anew from another picture, where `motion` takes it; None: that is outside the picture."""
         weight = cv2.warpAffine(self.weight, matrix(motion), picture.shape[::-1])
         return Part(picture, weight) if (weight > 0).any() else None
 
     def learn(self, match: Match) -> None:
-        """Adapt the weights of corners to whether they moved with the part in a match."""
+        """Raise the weights of corners that moved with the part in a match, and lower those of other seen corners."""
         wanted = self._weights * np.where(match.agreeing, 1.0, 0.05)
         self._believed += np.where(match.seen, 0.2 * (wanted - self._believed), 0)
 
@@ -439,7 +438,7 @@ def _expected_error(
 
 
 def _corners(picture: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Return the corners (n,) of a picture where the weight is above 0: stronger than noise, and not too close."""
+    """Find corners (n,) of a picture where the weight is above 0: stronger than noise, and not too close together."""
     mask = (weight > 0).astype(np.uint8)
     apart = max(3.0, np.sqrt(mask.sum() / MOST_CORNERS) * 0.6)
     strength = cv2.cornerMinEigenVal(picture, 5)
@@ -449,7 +448,7 @@ def _corners(picture: np.ndarray, weight: np.ndarray) -> np.ndarray:
 
 
 def plane(places: np.ndarray) -> np.ndarray:
-    """Return points (…, 2), x and y, as complex numbers (n,)."""
+    """Convert points (…, 2), x and y, to complex numbers x + iy, (n,)."""
     x, y = places.reshape(-1, 2).astype(np.float64).T
     return x + 1j * y
 
@@ -466,7 +465,7 @@ def inside(picture: np.ndarray, points: np.ndarray, margin: float = 0) -> np.nda
 
 
 def matrix(motion: Similarity, origin: complex = 0) -> np.ndarray:
-    """Return a motion as OpenCV's (2, 3) matrix, for points of a picture that was cropped at the point `origin`."""
+    """Convert a motion to OpenCV's (2, 3) matrix, for points in a picture that was cropped at the point `origin`."""
     shift = motion(origin)
     turn = motion.turn
     return np.array([[turn.real, -turn.imag, shift.real], [turn.imag, turn.real, shift.imag]])

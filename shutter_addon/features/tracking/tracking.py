@@ -105,9 +105,12 @@ class PartTracker:
     """
 
     def __init__(self, part: Part, footage: Footage, frame: int, motion: Motion) -> None:
-        """Follow a part from its own picture, which is that of a frame.
+        """Prepare to follow a part.
 
         Args:
+            part: The part, taken from the picture of `frame`.
+            footage: The pictures.
+            frame: The timeline frame where tracking begins.
             motion: What changes, as in Track.follow.
         """
         self._first, self._footage, self._motion, self.reason = part, footage, motion, COVERED
@@ -120,7 +123,7 @@ class PartTracker:
         self._trust = 1.0  # the confidence that this is still the part
 
     def next(self, frame: int) -> FoundMotion | None:
-        """Return the part's motion from its own picture to a frame's; None: it is not found."""
+        """Return the part's motion from the picture where tracking began to that of a frame; None: it is not found."""
         picture, missed = self._footage.picture(frame), self._missed
         sighting = None if missed else self._near(picture, self._speed.after(self._known))
         if sighting is None:
@@ -160,9 +163,9 @@ class PartTracker:
         return kept if was_lost and self._first.lookalike(picture, sighting.motion) else sighting.confidence
 
     def _held(self, picture: np.ndarray, sighting: FoundMotion) -> float | None:
-        """Return which share of the found corners comes from the part's place some pictures before, 0 to 1.
+        """Return which share of the found corners, traced back some pictures, was at the part's place there, 0 to 1.
 
-        They come from elsewhere if tracking slipped onto something else. None: too few can be traced back.
+        Corners come from elsewhere if tracking slipped onto something else. None: too few can be traced back.
         """
         pictures, back = [picture, *(each[0] for each in reversed(self._seen))], sighting.motion.inverse()
         step = self._known.after(back)(sighting.held) - sighting.held
@@ -173,7 +176,7 @@ class PartTracker:
         return min(float((off < _ASTRAY * max(self._first.box[2:])).mean()) / _AGREEING, 1.0)
 
     def _near(self, picture: np.ndarray, guess: Similarity) -> FoundMotion | None:
-        """Find the part near a guess, by its first look or, if that is not sure, a later one; None: it is not found."""
+        """Find the part near a guessed place, by its first look or, if that is unsure, a later one; None: not found."""
         match = self._first.find(picture, guess, self._motion)
         sure = confidence(match, picture)
         if match and sure >= SURE:
@@ -255,7 +258,7 @@ class _Look:
 
 
 def confidence(match: Match | None, picture: np.ndarray) -> float:
-    """Return how sure a match is, 0 to 1; None: 0.
+    """Return how sure a match is, 0 to 1; 0 if the match is None.
 
     It depends on its expected error, on how many corners agree, and on how alike the pixels are. The more alike they
     are, the fewer corners have to agree.
@@ -274,7 +277,7 @@ def confidence(match: Match | None, picture: np.ndarray) -> float:
 def lost(frames: np.ndarray, sure: np.ndarray) -> int | None:
     """Return the frame at which a subject was lost; None: nowhere.
 
-    That is the end of the first long stretch of unsure frames at which sure frames lie.
+    That is where the first long stretch of unsure frames begins or, if it begins at the first frame, where it ends.
 
     Args:
         frames: (n,), ascending.
@@ -306,7 +309,7 @@ class Pursuit(Protocol):
     reason: str
 
     def next(self, frame: int) -> FoundMotion | None:
-        """Return its motion from the first frame to this one; None: it is not found."""
+        """Return the motion of what is followed, from the first frame to this one; None: it is not found."""
 
 
 class Track(ABC):
@@ -370,7 +373,7 @@ class Track(ABC):
         return self._from(start, frames)
 
     def _placement(self, frame: int) -> Placement:
-        """Return the subject's placement (location, rotation, scale) at a frame where tracking starts."""
+        """Return the location, rotation and scale that the subject's own data give at a frame where tracking starts."""
         return self._subject.placement(frame)
 
     def _between(self, start: int, anchor: int) -> Iterator[Tracked]:
@@ -395,7 +398,7 @@ class Track(ABC):
         yield from (fault for fault in faults if fault.frame not in there | back)
 
     def _from(self, start: int, frames: range) -> Iterator[Tracked]:
-        """Yield where the subject is at frames that lead away from `start`, in order, until lost or at a cut."""
+        """Yield where the subject is at frames that lead away from `start`, in order, until it is lost or at a cut."""
         self._footage.want(frames)
         tracker, worth = self._tracker(start)
         last, shown = Tracked(frame=start, placement=self._placement(start), confidence=1.0), start
@@ -426,7 +429,7 @@ class Track(ABC):
         return motions.unwound(moved, near)
 
     def _bridged(self, last: Tracked, seen: Tracked, lost: list[int]) -> Iterator[Tracked]:
-        """Yield the frames in which the subject was not found, on a straight path between those where it was.
+        """Yield where the subject is (Tracked) at frames where it was not found: on a straight path in between.
 
         Args:
             last: The last frame before in which it was found.
@@ -490,7 +493,7 @@ def _falloff(away: np.ndarray, reach: float) -> np.ndarray:
 
 
 def _blended(first: Tracked | None, second: Tracked | None, share: float) -> Tracked | None:
-    """Blend two results of tracking for the same frame, from two starts. None: there is neither.
+    """Blend two results of tracking for the same frame, from two starts; None if both are None.
 
     Each weighs more, the surer it is and the nearer its start.
 

@@ -51,10 +51,10 @@ def run(arguments: Namespace) -> None:
 
 
 def _check_parent(film: baked_film.Film) -> None:
-    """Check, for a bake that another Blender has started, that this Blender still runs: it holds our stdin open.
+    """Check that the Blender that started this bake still runs: it holds our standard input open.
 
     Raises:
-        InterruptedRenderError: It has ended.
+        InterruptedRenderError: That Blender has ended.
     """
     with suppress(OSError):  # nothing to read: it is still there
         if not os.read(0, 1):

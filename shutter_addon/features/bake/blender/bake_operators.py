@@ -110,7 +110,10 @@ def unbake(self: Operator, _context: Context, _effect: PropertyGroup) -> None:
 
 
 def _look() -> float | None:
-    """Add the baked strip when the running bake has finished, or note why it failed. This is a timer of Blender."""
+    """Add the baked strip when the running bake has finished, or note why it failed.
+
+    A timer of Blender calls this, again after the seconds that it returns; None: not again.
+    """
     if (job := _bake.running) is None:
         return None
     redraw(bpy.context)
@@ -262,23 +265,23 @@ def _move(owner: SequenceEditor | MetaStrip, strip: Strip, channel: int) -> None
 
 
 def baked_of(scene: Scene, strip: Strip) -> list:
-    """Return the baked strips of an effect strip that lie where they were baked. Copies elsewhere do not count."""
+    """Return the baked strips of an effect strip at the time they were baked for, not copies moved elsewhere."""
     start = round(strips.origin(strip))
     parts = [other for other in selection.of_bake(scene, strip) if other.type in strips.SOURCES]
     return [part for part in parts if round(strips.origin(part)) - part.virtual_shutter_bake.first == start]
 
 
 def effect_parts(scene: Scene, strip: Strip) -> list:
-    """Return all parts that a baked effect strip was cut into, itself included; []: it is not baked."""
+    """Return all effect strips into which a baked effect strip was cut, itself included; []: it is not baked."""
     start = round(strips.origin(strip))
     parts = (other for other in selection.of_bake(scene, strip) if round(strips.origin(other)) == start)
     return [part for part in parts if part.type == "SCENE"]
 
 
 def is_stale(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
-    """Tell whether an effect has changed since it was baked, or cannot be shown.
+    """Tell whether an effect has changed since it was baked, or cannot be shown any more.
 
-    The answer is kept until something changes.
+    The answer is cached until something in the file changes.
     """
     place = _place(scene, effect, strip)
     return revision.until_change("bake", place, lambda: effect_version.is_changed(scene, effect, strip))

@@ -71,7 +71,7 @@ class Film:
         ]
 
     def is_finished(self) -> bool:
-        """Tell whether all of it exists, without decoding pictures."""
+        """Tell whether the whole film exists as complete files, without decoding pictures."""
         if self.kind == "MOVIE":
             return self.place.is_file() and is_whole_movie(self.place, len(self.frames))
         return all(picture.is_file() and is_whole_picture(picture) for picture in self.pictures)
@@ -100,7 +100,7 @@ def film_of(scene: Scene, effect: PropertyGroup, strip: Strip, kind: Kind, folde
 
 
 def _check(scene: Scene, effect: PropertyGroup, strip: Strip, kind: Kind) -> None:
-    """Check that a film would show what the strip shows.
+    """Check that a baked film would look like the effect strip.
 
     Raises:
         EffectError: It would not, because of retiming, missing packages, colors or transparency.
@@ -187,7 +187,7 @@ def _make_movie(film: Film, picture: Picture, fps: Fraction, report: Callable[[]
 
 
 def _prepare(place: Path) -> None:
-    """Make a folder, and remove from it what processes that have ended left unfinished.
+    """Make a folder for a film, and remove unfinished files that ended processes left there.
 
     Raises:
         OSError: It cannot be made, or is a link that somebody else may have made.
@@ -239,7 +239,7 @@ class BakeJob:
     process: subprocess.Popen
 
     def done(self) -> int:
-        """Return the number of finished frames, which the process prints."""
+        """Return how many frames the process has finished, as it printed last."""
         lines = self._said("out").split("\n")[:-1]
         counts = [line.split()[0] for line in lines[-2:] if line.endswith(f" of {len(self.film.frames)}")]
         return int(counts[-1]) if counts else 0
@@ -248,7 +248,7 @@ class BakeJob:
         return self.process.poll() is not None
 
     def failure(self) -> str | None:
-        """Return why the bake has failed, after its end; None: the film is finished."""
+        """Return why the bake has failed; None: the film is finished. To be called once the process has ended."""
         if self.film.is_finished():
             return None
         said = [line for line in self._said("err").splitlines() if line.startswith(signed(""))]

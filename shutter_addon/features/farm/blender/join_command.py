@@ -79,7 +79,7 @@ def _pictures(folder: Path, frames: range) -> list[Path]:
 
 
 def _common(paths: list[Path], looked: Callable, size: tuple[int, int], key: str) -> RenderedPicture:
-    """Read all pictures, check that they are alike, and return their common size, channels and so on.
+    """Read all pictures, check that they are whole and alike, and return the properties that they have in common.
 
     Args:
         looked: Called after each picture.
@@ -114,15 +114,15 @@ def _described(picture: RenderedPicture) -> str:
 
 
 def _refuse_transparency(scene: Scene, paths: list[Path], first: RenderedPicture) -> None:
-    """Check that no picture is a transparent PNG file that a film rendered by Blender would show in other colors.
+    """Refuse transparent PNG files that a film rendered by Blender would show in other colors.
 
-    A film applies the view transform after composing over black, but the files have it applied to their colors already.
+    Blender applies the view transform after laying a picture over black, but these colors have it already.
 
     Args:
         first: What all pictures have in common.
 
     Raises:
-        OutputError: One is.
+        OutputError: A picture is such a file.
     """
     is_shown_otherwise = _shown(scene).view_settings.view_transform != "Standard"
     if paths[0].suffix == ".png" and first.channels in (2, 4) and is_shown_otherwise:
@@ -139,7 +139,7 @@ def _shown(scene: Scene) -> Scene | ImageFormatSettings:
 
 
 def _cover_edit(scene: Scene, paths: list[Path], first: RenderedPicture) -> None:
-    """Add strips with the pictures above all others, so that the edit shows nothing else. Sounds stay.
+    """Add strips with the rendered pictures above all others, so that the edit shows only these. Sounds stay.
 
     Args:
         first: What all pictures have in common.

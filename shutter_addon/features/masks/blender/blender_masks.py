@@ -97,7 +97,7 @@ def _spline(mask: Mask, spline: MaskSpline) -> masks.MaskSpline:
 
 
 def _check(mask: Mask, values: ArrayLike) -> None:
-    """Check that numbers of a mask are finite and not beyond _FARTHEST.
+    """Check that numbers of a mask are finite and at most _FARTHEST from 0.
 
     Raises:
         EffectError: One is not.

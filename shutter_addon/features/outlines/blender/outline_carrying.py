@@ -87,7 +87,7 @@ def want_matte(file: CarriedFile, frame: int) -> None:
 
 
 def carry(file: CarriedFile, frames: list[int], middle: int | None = None) -> None:
-    """Begin to make mattes on a thread, in place of those being made.
+    """Begin to make mattes on a thread; it stops making others.
 
     Args:
         frames: Frames of the footage.
@@ -105,7 +105,7 @@ def failure(file: CarriedFile) -> str | None:
 
 
 def progress() -> tuple[int, int] | None:
-    """Return how many mattes are made so far, and of how many; None: none are being made."""
+    """Return how many mattes the thread has made and how many it has to make; None: none are being made."""
     carrying = _mattes.carrying
     return (carrying.done, len(carrying.frames)) if carrying else None
 
@@ -113,7 +113,7 @@ def progress() -> tuple[int, int] | None:
 def note_tracking(say: Callable[[str], None]) -> None:
     """Begin to make the mattes that a preview lacked when it was drawn, and add notes about progress and failure.
 
-    Mattes that are not wanted any more are given up for them. To be called on the main thread after drawing a preview.
+    The thread drops mattes that are not wanted any more. To be called on the main thread after drawing a preview.
 
     Args:
         say: Adds a note to the preview.
@@ -131,7 +131,10 @@ def note_tracking(say: Callable[[str], None]) -> None:
 
 
 def _look() -> float | None:
-    """Redraw previews when the thread has made mattes, and notice its end. This is a timer of Blender."""
+    """Redraw previews when the thread has made mattes, and notice its end.
+
+    A timer of Blender calls this, again after the seconds that it returns; None: not again.
+    """
     if (carrying := _mattes.carrying) is None:
         return None
     preview_areas.redraw(bpy.context)

@@ -42,8 +42,8 @@ _MORE = 1.25  # factor for each turn of the wheel
 def curves_now(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> outlines.Curves:
     """Return the curves of an outline or subject at the current frame, in fractions of the picture.
 
-    They are those drawn there, or traced around the tracked matte; where nothing is tracked yet, those of an outline
-    that moves straight from drawing to drawing.
+    These are the curves drawn at the frame, or else those around its tracked matte. Where that is not made yet, curves
+    move straight from drawing to drawing.
 
     Args:
         index: Of the region.
@@ -65,7 +65,7 @@ def _opened(file: CarriedFile) -> CarriedMattes:
 
 
 def shown_curves(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> outlines.Curves:
-    """Return what `curves_now` returns, for drawing code. It is kept until something changes."""
+    """Return what `curves_now` returns, for drawing code. The result is cached until something in the file changes."""
     key = effect.scene.session_uid, strip.name, index, scene.frame_current
     return revision.until_change("outline", key, lambda: curves_now(scene, effect, strip, index))
 
@@ -95,7 +95,7 @@ def next_needed(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -
 
     Returns:
         The timeline frame, the middle one of several, and how sure tracking is there, 0 to 1. If no frame needs a
-        drawing, None and how sure all are at least.
+        drawing, None and the confidence that all frames reach.
 
     Raises:
         EffectError, MediaError: The outline is not tracked, or the effect has no source.
@@ -284,7 +284,7 @@ def subject_outline(self: Operator, _context: Context, effect: PropertyGroup) ->
 
 
 def after_stroke(context: Context, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
-    """After the first stroke of a new effect, look for a subject under it. If there is one, the region becomes it.
+    """Look for a subject under the first stroke of a new effect. If there is one, the region becomes that subject.
 
     Called when the pen goes up. Further strokes then mark the subject.
     """

@@ -50,7 +50,7 @@ class Repair(NamedTuple):
 
 
 def of(effect: PropertyGroup) -> Repair | None:
-    """Return the repair of an effect, recognized by its ramp and shutters, whatever their names; None: it has none."""
+    """Return the rolling shutter repair of an effect, recognized by its ramp and shutters; None: it has none."""
     if effect.inbetween == "1" or not effect.shutters:
         return None
     default = _moment(effect.shutters[0])
@@ -67,13 +67,13 @@ def of(effect: PropertyGroup) -> Repair | None:
 
 
 def _moment(shutter: PropertyGroup) -> float:
-    """Return the middle of the time that a shutter is open, in frames from its first one; NaN: it is never open."""
+    """Return the weighted middle of a shutter's open time, in frames of its window from 0; NaN: it is never open."""
     weights = bars(shutter)
     return float((weights * np.arange(len(weights))).sum() / weights.sum()) if weights.any() else math.nan
 
 
 def _shown(effect: PropertyGroup) -> int:
-    """Return the index of the frame of the shutters' window that is the shown frame, with *Position* at *Center*."""
+    """Return the index of the shown frame in the shutters' window, if the window's *Position* is *Center*."""
     return Options(validation.number(effect, "window"), position="center").before
 
 

@@ -70,7 +70,7 @@ class _Coming:
         return render.request(snapshot, frame, replace(detail, smooth=False))
 
     def lacks(self, request: Request) -> bool:
-        """Tell whether frames have to be read before a picture can be made."""
+        """Tell whether frames have to be read before the picture of a request can be made."""
         return bool(self.asked[0].renderer(request).missing(request))
 
     def rest(self) -> None:
@@ -79,10 +79,10 @@ class _Coming:
             self.asked[0].renderer(request).source.want(())
 
     def advance(self, seconds: float) -> float:
-        """Do a part of the work: find how many moments there are, or compose the picture for some seconds.
+        """Go on making the picture: find how many moments there are, or compose the picture for some seconds.
 
         Returns:
-            In how many seconds to redraw and go on.
+            In how many seconds to redraw the preview and go on.
         """
         render, snapshot, frame, detail = self.asked
         if not self.is_seen:
@@ -114,7 +114,10 @@ _coming: dict[int, _Coming] = {}  # by effect scene
 def smooth_request(render: RenderContext, snapshot: Snapshot, frame: float, detail: Detail) -> tuple[Request, bool]:
     """Return the request for the picture with moments between frames if that is ready, else for the one without.
 
-    Begin to make the one with moments, if the effect wants it. The second value tells whether it follows.
+    If the effect has moments and they are not ready, begin to make that picture.
+
+    Returns:
+        The request, and whether the picture with moments will follow later.
 
     Raises:
         effect_source.FAULTS: The effect cannot be shown.
@@ -141,7 +144,7 @@ def smooth_request(render: RenderContext, snapshot: Snapshot, frame: float, deta
 
 
 def advance_smooth(seconds: float) -> None:
-    """Go on making pictures with moments between frames, for some seconds each, once the ones without were drawn.
+    """Go on making pictures with moments between frames, for some seconds each, if previews still ask for them.
 
     Raises:
         effect_source.FAULTS: One cannot be made.
@@ -171,6 +174,6 @@ def rest_smooth() -> None:
 
 
 def forget_pictures() -> None:
-    """Wait for threads and forget all pictures in work, when a file is loaded or the extension is disabled."""
+    """Wait for threads and forget all unfinished pictures, when a file is loaded or the extension is disabled."""
     wait([coming.steps for coming in _coming.values() if coming.steps is not None])
     _coming.clear()

@@ -63,7 +63,7 @@ _measuring = _Measuring()
 
 
 def look(effect: PropertyGroup, snapshot: Snapshot, renderer: Renderer, request: Request) -> tuple[float | None, bool]:
-    """Find out from what is known how far the picture moves between exposed frames. What is unknown is measured later.
+    """Tell from past measurements how far the picture moves between exposed frames. What is unknown is measured later.
 
     Returns:
         The step from frame to frame in pixels of the footage; None: it is small enough for a streak, or not known yet.
@@ -76,13 +76,13 @@ def look(effect: PropertyGroup, snapshot: Snapshot, renderer: Renderer, request:
 
 
 def last(effect: PropertyGroup) -> float | None:
-    """Return the step in pixels that `look` found last, if that was at the current frame, else None."""
+    """Return the motion between exposed frames, in pixels, that `look` found last; None: none, or at another frame."""
     frame, known, _repeats = _measuring.looks.get(effect.scene.session_uid, _NEVER)
     return known if frame == effect.id_data.frame_current else None
 
 
 def repeats(effect: PropertyGroup) -> bool:
-    """Tell whether `look` found last that the source repeats frames."""
+    """Tell whether the source repeats frames, as `look` found last."""
     return _measuring.looks.get(effect.scene.session_uid, _NEVER)[-1]
 
 
@@ -105,9 +105,9 @@ def _step(effect: PropertyGroup, snapshot: Snapshot, renderer: Renderer, request
 
 
 def _exposed_pairs(renderer: Renderer, request: Request) -> dict[int, set[int]]:
-    """Return, by index of each visible shutter, the pairs of neighboring frames between which it does not close.
+    """Return for each visible shutter, by index, the pairs of neighboring frames that it exposes without closing.
 
-    A pair is given by its first frame.
+    A pair is given by its first frame. Shutters that take the median leave no streaks and are left out.
     """
     state, pairs = request.state, {}
     shot = renderer.shot(request, known=True)
@@ -130,7 +130,7 @@ def _visible(state: FrameState) -> set[int]:
 
 
 def _ways(state: FrameState, shutter: int, pair: int, height: int) -> tuple[Similarity, Similarity]:
-    """Return where points of the shown picture lie in the two frames of a pair, by what a shutter's exposure follows.
+    """Return the motions from the shown picture to the two frames of a pair, of what a shutter's exposure follows.
 
     Args:
         shutter: Index of the shutter.
@@ -162,7 +162,7 @@ def advance() -> bool:
 def note_streaks(
     effect: PropertyGroup, snapshot: Snapshot, renderer: Renderer, request: Request, say: Callable[[str], None]
 ) -> None:
-    """Add a note to a preview if the exposure has too few frames. Measure what is not known, once the frame stays.
+    """Add a note to a preview if the exposure has too few frames. Unknown motion is measured once the playhead rests.
 
     Args:
         say: Adds a note.

@@ -29,7 +29,7 @@ Point = tuple[str, np.ndarray, np.ndarray]  # see _markers
 def follow(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> None:
     """Insert keyframes that move a region with its track, from its place at the current frame and the user's keyframes.
 
-    Where tracking of the region had stopped is forgotten.
+    Notes of where tracking of the region had stopped are removed.
 
     Args:
         index: Of the region.
@@ -58,7 +58,7 @@ def holder_of(region: PropertyGroup) -> MovieTrackingObject | None:
 
 
 def _markers(region: PropertyGroup) -> list[Point]:
-    """Return each point that a region follows: its name, and the places of its markers.
+    """Return each point of a movie clip that a region follows: its name, and the places of its markers.
 
     Returns:
         Name, the clip's frames (n,), ascending, and places (n, 2) in fractions of the picture.
@@ -94,7 +94,7 @@ def _corners(plane: bpy.types.MovieTrackingPlaneTrack) -> list[Point]:
 
 
 def _shown(name: str, markers: bpy.types.bpy_prop_collection, places: np.ndarray) -> Point:
-    """Return a point as in _markers, without its muted markers."""
+    """Return a point (name, frames, places) as `_markers` does, without its muted markers."""
     is_shown = ~fcurves.numbers(markers, "mute", bool)
     return name, fcurves.numbers(markers, "frame", np.int32)[is_shown], places[is_shown]
 
@@ -219,14 +219,14 @@ def _followed(
 
 
 def _ways(frames: list[int], start: int) -> tuple[list[int], list[int]]:
-    """Return the frames after one, and those before it, backward."""
+    """Return the frames after `start`, ascending, and those before it, descending."""
     return [frame for frame in frames if frame > start], [frame for frame in reversed(frames) if frame < start]
 
 
 def _motions(points: dict[int, Points], origin: int) -> Motions:
-    """Return the picture's motion from one frame to each frame, by the points that both have.
+    """Return the picture's motion from the frame `origin` to each frame, by the points that both have.
 
-    With too few common points, it goes through the frame before.
+    With too few common points, motion is joined through the frame before.
     """
     by_frame = {origin: Similarity()}
     enough = min(2, len(points[origin]))

@@ -104,14 +104,14 @@ def _curves(keys: MotionKeys) -> Iterator[FCurve]:
 
 
 def _offer_keys(keys: MotionKeys, frames: range) -> None:
-    """Let tracking replace the keys of a motion at some frames, by marking them as made by tracking."""
+    """Mark the keys of a motion at some frames as made by tracking, so that tracking may replace them."""
     for key in (key for curve in _curves(keys) for key in curve.keyframe_points):
         if frames[0] <= key.co[0] <= frames[-1]:
             key.type, key.back = motion_keys.MADE, key.co[1]
 
 
 def _drop_keys_between(keys: MotionKeys, tracked: set[int]) -> None:
-    """Remove the keys of a motion between tracked frames, where tracking needs none."""
+    """Remove the keys of a motion between the first and the last tracked frame, except at tracked frames."""
     for curve in _curves(keys):
         for key in list(curve.keyframe_points)[::-1]:
             if min(tracked) < key.co[0] < max(tracked) and key.co[0] not in tracked:

@@ -57,14 +57,14 @@ class _Tracks(Beside):
     once = False  # not again what is tracked already
 
     def ended(self, context: Context) -> None:
-        """Do what a subclass does after tracking. Not called after Esc.
+        """Do what a subclass does after tracking; here nothing. Not called after Esc.
 
         Raises:
-            EffectError: It is impossible.
+            EffectError: It cannot be done.
         """
 
     def begin(self, context: Context, waits: bool) -> set[str] | None:
-        """Begin to track: for a moment, after which Blender calls goes_on, or to the end if `waits`."""
+        """Begin to track: for a moment, after which `goes_on` is called, or to the end if `waits`."""
         scene, effect, strip = selection.active(context)
         index = None if self.is_camera else effect.active_region
         moving = selection.moving(effect, index)
@@ -111,7 +111,7 @@ class _Tracks(Beside):
         """Track for some seconds. Return whether frames are left to track.
 
         Raises:
-            FAULTS: Nothing can be tracked.
+            FAULTS: Nothing can be tracked. Once a frame is tracked, errors are reported to the user instead.
         """
         end = time.perf_counter() + seconds
         try:
@@ -214,7 +214,7 @@ def _look(looking: Operator, effect: PropertyGroup, index: int | None) -> set[st
         index: Of the region; None: the camera.
 
     Returns:
-        {"CANCELLED"} if there is none, else None.
+        {"CANCELLED"} if no unsure frame is left, else None.
     """
     frame: int | None = looking.frame
     is_given = looking.properties.is_property_set("frame")
@@ -273,7 +273,7 @@ def draw_tracking(layout: UILayout, index: int | None, is_subject: bool = False)
 
 
 def tracking_icon(effect: PropertyGroup, index: int | None) -> str | None:
-    """Return the icon of what `draw_tracked` says of a region, or the camera for None: "ERROR", "INFO" or None."""
+    """Return the icon for what `draw_tracked` says of a region: "ERROR", "INFO" or None. Index None: the camera."""
     faults = track_region.faults(effect, index)
     if any(is_fault for _, _, is_fault in faults):
         return "ERROR"

@@ -133,7 +133,7 @@ def _stops(effect: PropertyGroup, index: int | None) -> list[tuple[int, Property
 
 
 def key_ends(effect: PropertyGroup, index: int | None) -> None:
-    """Insert keyframes that fade a region or the camera's influence out where its track ends, or remove such keyframes.
+    """Insert keyframes that fade out a region or the camera's influence where tracking ends, in place of older ones.
 
     A region that is a matte, such as an outline, gets none.
     """
@@ -171,7 +171,10 @@ def next_unsure(effect: PropertyGroup, index: int | None, frame: float) -> int |
 
 
 def faults(effect: PropertyGroup, index: int | None) -> list[tuple[int, str, bool]]:
-    """Return where tracking lost the subject, if it did, and where it stopped: frame, reason, whether a fault."""
+    """Return where tracking lost the subject, if it did, and where it stopped: frame, reason, whether a fault.
+
+    Frames are timeline frames. A cut in the footage is no fault.
+    """
     where = lost(effect, index)
     return [*([(*where, True)] if where else []), *stops(effect, index)]
 
@@ -194,10 +197,11 @@ def lost(effect: PropertyGroup, index: int | None) -> tuple[int, str] | None:
 def _subject(
     scene: Scene, effect: PropertyGroup, strip: Strip, index: int | None, frames: Sequence[int], here: Tracked
 ) -> tuple[Region | Camera, Callable]:
-    """Return what is tracked as plain data, and the function that tracks it.
+    """Return the region or camera to track as plain data, and the function that tracks it.
 
     Args:
-        here: Its place at the frame where tracking starts.
+        frames: Timeline frames to track.
+        here: The frame where tracking starts, and the place there.
 
     Returns:
         The region or camera, and a function with the arguments of tracking.Track.follow.
@@ -218,7 +222,7 @@ def _subject(
 
 
 def _standing(moving: Any, here: Tracked) -> Any:
-    """Return a region or the camera as plain data, with the place that the user has set at one frame, keyed or not.
+    """Copy a region or the camera (plain data) with the place that the user has set at one frame, keyed or not.
 
     Args:
         moving: The region or camera.
@@ -233,7 +237,7 @@ def _standing(moving: Any, here: Tracked) -> Any:
 
 
 def _followed(found: Iterator[Tracked], patience: float | None) -> Iterator[Tracked | None]:
-    """Yield what tracking finds, while it runs on a thread. Its errors are raised in the user's language.
+    """Run tracking on a thread, and yield what it finds. Its errors are raised in the user's language.
 
     Args:
         patience: As in `track`.
@@ -280,7 +284,7 @@ def make_follow(effect: PropertyGroup, index: int, subject: str, key: bool) -> N
     Args:
         index: Of the shutter.
         subject: "REGION" or "CAMERA".
-        key: Insert keyframes for its bars.
+        key: Insert keyframes for the shutter's bars.
 
     Raises:
         EffectError: The window's length is out of range. Nothing has changed.
@@ -311,7 +315,7 @@ def panning_shot(effect: PropertyGroup, index: int, key: bool = False) -> None:
 def is_tracked(scene: Scene, effect: PropertyGroup, strip: Strip, index: int | None) -> bool:
     """Tell whether a region or the camera has keyframes of motion that reach the current frame.
 
-    Otherwise *Panning Shot* and *Stabilize Exposure* track it first.
+    A region must also be drawn at this frame. Otherwise *Panning Shot* and *Stabilize Exposure* track it first.
 
     Args:
         index: Of the region; None: the camera.
