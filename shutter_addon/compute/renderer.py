@@ -312,9 +312,9 @@ class Renderer:
         return _in_order(self.source, [frames - lacking[0] for frames in lacking[1:]])
 
     def _is_guided(self, request: Request) -> bool:
-        """Return whether the shown frame's picture counts for how much of each shutter a pixel gets.
+        """Return whether edges in the shown frame affect how much of each shutter a pixel gets.
 
-        It does if scribbles stop at its edges, and do not give one shutter to all pixels.
+        They do if scribbles stop at edges, and do not give one shutter to all pixels.
         """
         return request.state.options.edge_aware > 0 and sole_of(self.labels(request)) is None
 

@@ -23,13 +23,14 @@ class Request:
     """A request for one picture: everything that the picture depends on, as plain data.
 
     Attributes:
-        index: The shown source frame, from 0; with Smooth, the moment.
+        index: The shown source frame, from 0. With Smooth, each moment counts as a source frame.
         state: The effect at that frame.
         direction: 1, or −1 if the footage plays backward: the window's next frames are then those before `index`.
-        source: The footage and its size, for a caller with several renderers.
-        levels: Whether the picture has 8-bit display code values instead of scene-linear light.
+        source: Names the footage and its size. A caller with several renderers chooses one by it.
+        levels: Whether the picture is in 8-bit sRGB values over black. Otherwise it is in scene-linear float32.
         quick: Whether the diffusion may start from the last coefficients, on which the picture then depends slightly.
-        display: Converts the opaque scene-linear picture to levels. None: the picture itself is wanted.
+        display: Converts the finished picture, opaque and scene-linear, to 8-bit values as Blender's output does.
+            `levels` is False then. None: the picture is not converted.
     """
 
     index: int

@@ -50,7 +50,7 @@ class RecentValues(dict[K, T]):
     """A cache of the values that were used last: a dict by key, with the least recently used value first."""
 
     def ask(self, key: K, make: Callable[[], T], most: int) -> T:
-        """Return the cached value of a key, or make it. At most `most` values are cached from then on."""
+        """Return the cached value of a key, or make and cache it. Drop the least recently used ones beyond `most`."""
         return self.keep(key, self[key] if key in self else make(), most)
 
     def keep(self, key: K, value: T, most: int) -> T:

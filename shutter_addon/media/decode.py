@@ -196,12 +196,14 @@ class _Landmarks:
             self._latest = max(self._latest, packet.pts)
 
     def is_sound(self, packet: Packet, misleading: bool) -> bool:
-        """Return whether decoding may begin at a key frame: whether no packet before it has a later time.
+        """Return whether decoding may begin at a key frame: whether no packet before it in the file has a later time.
+
+        This is known of key frames that a decode from the file's start has passed. Others count as sound, unless
+        `misleading` is True or one of the known ones is unsound.
 
         Args:
             packet: The key frame's.
-            misleading: Trust only key frames that a decode from the file's start has seen. This always holds if time
-                stamps were seen to go back.
+            misleading: Whether key frames of the file's format cannot be trusted.
         """
         return self._seen.get((time_of(packet), packet.size), not (misleading or self._goes_back))
 

@@ -171,7 +171,7 @@ def refuse_link(path: Path) -> None:
 
 
 class StoredVectors:
-    """Finds the optical flow between two pictures, or reads it from a folder where it was stored before."""
+    """Finds the optical flow between two pictures and stores it in a folder, or reads it if it is there already."""
 
     def __init__(self, folder: Path, writes: bool) -> None:
         """Prepare to read and store optical flow vectors in a folder.

@@ -26,9 +26,10 @@ class MatteValues:
 
         Args:
             width, height: Size of the pictures in pixels.
-            step: Source frames for each filmed one (Options.step).
-            late: Called with the file and the frame of each matte that is not tracked to this frame yet. Its outline
-                moves straight from drawing to drawing instead. None: such a matte is tracked now, which takes time.
+            step: Moments per filmed frame (Options.step), more than 1 with Smooth. Each counts as a source frame, but
+                mattes only have filmed frames.
+            late: Called with the file and the frame of each matte that is not tracked to this frame yet. Until it is,
+                its outline moves straight from drawing to drawing. None: track it now, which takes time.
         """
         self._size, self._step, self._late = (width, height), step, late
         self._sources: dict[SourceFile, FrameSource] = {}

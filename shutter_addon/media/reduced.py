@@ -15,13 +15,11 @@ STRETCHED = 0.1  # how much a proxy's aspect may differ, since the sides of Blen
 
 
 def smaller(source: FrameSource, divisor: int) -> FrameSource:
-    """Return a source whose frames are reduced by a factor to each side, by averaging squares of pixels.
-
-    Where the size is no multiple of the factor, the last row and column stand for fewer pixels.
+    """Return a source whose frames are reduced by averaging squares of pixels (see `reduced`).
 
     Args:
         source: The footage.
-        divisor: The factor.
+        divisor: The squares' side. The width and height are divided by it and rounded up. 1: return `source` itself.
     """
     if divisor == 1:
         return source

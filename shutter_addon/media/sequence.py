@@ -299,10 +299,18 @@ def _first_colours(image: ImageInput, path: Path) -> Layer:
 
 
 def _channel_named(channel: str, image: ImageInput, path: Path) -> Layer:
-    """Return the channels of an image that make one channel: their part and positions.
+    """Find the channels of an image that a channel's name stands for.
 
-    There are three for the luminance of colors, and none for the alpha of an opaque image. A channel of an EXR that is
-    itself named "red" comes before its red: files of coefficients have the names of shutters.
+    "luminance" stands for all colors, and "alpha" for no channel if the image is opaque. If an EXR has a channel of
+    exactly this name, only that one counts: files of coefficients name channels after shutters, which may be "red".
+
+    Args:
+        channel: A key of CHANNELS, or the name of a channel in the file.
+        image: The opened file.
+        path: The file, for messages.
+
+    Returns:
+        The part of the file that has the channels, and their positions there.
 
     Raises:
         MediaError: The image has no such channel.

@@ -82,10 +82,13 @@ def preview_region(area: Area) -> bpy.types.Region:
 
 
 def shown(context: Context, channel: int = 0) -> Shown | None:
-    """Return the effect strip that the context's preview shows at the playhead (selection.seen), or None.
+    """Return the effect strip that the context's preview shows at the playhead (selection.seen).
 
     Args:
-        channel: The value that the preview's setting *Display Channel* has to have; 0: all channels.
+        channel: The value that the preview's setting *Display Channel* must have. It is 0 in a preview of all channels.
+
+    Returns:
+        The strip. None: there is none, or the preview has another *Display Channel* or shows a scope.
     """
     scene, space = selection.scene_of(context), context.space_data
     if (space.display_mode, space.display_channel) != ("IMAGE", channel) or (seen := selection.seen(scene)) is None:
@@ -99,7 +102,16 @@ def shown(context: Context, channel: int = 0) -> Shown | None:
 
 
 def look(context: Context, scene: Scene, effect: PropertyGroup, strip: Strip) -> Look:
-    """Return how the previews of a scene show an effect's picture: how large, from which proxy, whether unchanged."""
+    """Return how the previews of a scene show an effect's picture.
+
+    Args:
+        scene: The scene of the edit.
+        strip: The effect strip.
+
+    Returns:
+        The scale and the proxy of the largest preview. And whether all previews show the picture as it is, without
+        blending, modifiers or view settings that change it.
+    """
     areas = list(_areas_of(context, scene))
     scales = {area.spaces.active: _scale(context, scene, strip, area) for area in areas}
     scales = {space: scale for space, scale in scales.items() if math.isfinite(scale)}

@@ -190,8 +190,8 @@ def strokes_at(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, fr
 def region_at(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, frames: Frames) -> Any:
     """Return a region as plain data, sampled at timeline frames, for tracking and drawing.
 
-    An outline is given as a lasso region of its curves, a subject as a line region of its strokes. What is wrong at one
-    frame only is raised when that frame's values are asked for.
+    An outline is given as a lasso region of its curves, a subject as a line region of its strokes. An error that
+    concerns only one frame is raised later, when that frame's values are read.
 
     Args:
         index: Of the region.

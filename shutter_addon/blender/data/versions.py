@@ -81,7 +81,8 @@ def _footage_files(scene: Scene) -> Iterator[list[Path]]:
 def digests(files: list[Path]) -> list[bytes | None]:
     """Return a digest of each file's contents; None for a file that is missing or unreadable.
 
-    They are read in parallel. If there are more than _FEW, only blocks of larger files are read.
+    They are read in parallel. Of a file above derived.WHOLE bytes, only the size and some blocks count. If there are
+    more than _FEW files, this begins above _BLOCKS bytes.
     """
     whole = derived.WHOLE if len(files) <= _FEW else _BLOCKS
     with threads.pool(_READERS) as pool:

@@ -177,7 +177,7 @@ class MotionKeys:
             setattr(moving, name, whole)
 
     def _curves(self, count: int = len(_COMPONENTS)) -> list[fcurves.Timed]:
-        """Return the existing F-curves among the first `count` of _COMPONENTS."""
+        """Return the F-curves of the first `count` of _COMPONENTS, in order. Components without one are left out."""
         found = (self._curve(name, component) for name, component in _COMPONENTS[:count])
         return [curve for curve in found if curve is not None]
 

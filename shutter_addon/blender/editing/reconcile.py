@@ -304,7 +304,7 @@ def _follow_strips(shown: list[strips.Shown]) -> None:
 def _move_drawings(effect: PropertyGroup, start: float) -> None:
     """Move drawings of an effect in time, from the start frame that their annotation stores, to `start`.
 
-    The annotation stores it because undo may restore the effect without the annotation, which a handler moved.
+    The effect's own start would not do: undo may restore it, but leave the annotation as a handler has moved it.
     """
     annotation = effect.scene.annotation
     if annotation is None or annotation.library is not None:
@@ -339,9 +339,9 @@ def _unmute_sources(scenes: list[Scene], shown: list[strips.Shown]) -> None:
 
 
 def _is_baked_over(source: Strip) -> bool:
-    """Tell whether a strip with a baked (rendered) effect lies above a source.
+    """Tell whether a strip with a baked (rendered) effect lies above a source that it is connected with.
 
-    The source would show through transparent parts of the baked strip.
+    The source then stays muted, as it would show through transparent parts of the baked strip.
     """
     baked = (s for s in source.connections if s.type in strips.SOURCES and s.channel > source.channel)
     return any(s.virtual_shutter_bake.identity and strips.overlap(s, source) for s in baked)

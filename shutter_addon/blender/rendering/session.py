@@ -105,7 +105,10 @@ class RenderContext:
         """Return the request for an effect strip's picture at a timeline frame: what it depends on, as plain data.
 
         Args:
-            detail: The picture's detail; None: that of the effect's last picture, if only its data are needed.
+            snapshot: The effect and its source, as plain data.
+            frame: The timeline frame.
+            detail: The picture's detail. None: that of the effect's last picture, or full detail if there is none. This
+                suffices for a caller that only reads the request and makes no picture.
 
         Raises:
             effect_source.FAULTS: The effect cannot be shown.

@@ -24,11 +24,11 @@ class RetimingKey:
 
 @dataclass(frozen=True)
 class StripTiming:
-    """The timing of a strip that shows footage. Fields have Blender's names and count timeline frames.
+    """The timing of a strip that shows footage. Fields that are not explained here are those of Blender's strips.
 
     Attributes:
         name: The strip's.
-        first: The number of the footage's frame that is the content's first.
+        first: How many of the footage's frames come before the content: *Frame Offset* of a movie clip, else 0.
         scene_fps: Frames per second of the edit.
         strobe: Only every n-th frame of the content is shown, and held; 1: all are.
         keys: The retiming keys, finite and in order.

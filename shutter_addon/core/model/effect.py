@@ -296,8 +296,8 @@ class Camera(Subject):
     """How the camera's view moves in the picture, about the picture's centre, so that shutters can follow it.
 
     Attributes:
-        influence: Channel of 0 to 1, the length of exposures that follow the camera. At 0 they are the shown frame
-            only.
+        influence: Channel of 0 to 1. Exposures that follow the camera are open for this share of their time, at 0 for
+            the shown frame only. How closely they follow stays the same.
     """
 
     influence: Channel = Labelled(

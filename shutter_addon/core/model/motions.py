@@ -26,10 +26,10 @@ _CORNER = 0.5 + 0.5j
 
 @dataclass(frozen=True)
 class Placement:
-    """Where the keys of a region or of the camera put it at a frame, about its centre (see scribbles.transform).
+    """How the keys of a region or of the camera move it at a frame, about its centre (see scribbles.transform).
 
     Attributes:
-        location: x, y in fractions of the picture, y up.
+        location: By how much it is shifted: x as a fraction of the picture's width, y of its height, y up.
         rotation: Degrees counter-clockwise.
         scale: A factor.
     """

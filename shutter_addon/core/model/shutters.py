@@ -232,11 +232,13 @@ def smoothed(bars: ArrayLike, steps: int, *, backward: bool = False, level: bool
         bars: (L,).
         steps: Moments per filmed frame, 1 or an even number.
         backward: Whether the footage plays backward, so that a bar's frame is the last of its moments.
-        level: Keep the relative heights of bars instead of each bar's sum, for the lightest or darkest of all moments.
+        level: Whether the moments beside a frame are as high as its bar, and the middle between two frames as high as
+            the mean of their bars. This is for the lightest or darkest of all moments. Otherwise, each bar keeps its
+            sum.
 
     Returns:
-        Bars of moments (L · steps,) with the same sum. Moment k · steps is filmed frame k, backward k · steps + steps −
-        1.
+        Bars of moments (L · steps,), scaled to the sum of all `bars` in both cases. Moment k · steps is filmed frame k,
+        backward k · steps + steps − 1.
     """
     bars = np.asarray(bars, dtype=np.float64)
     if steps == 1:
@@ -275,12 +277,12 @@ def held(bars: ArrayLike, steps: int) -> np.ndarray:
 
 
 class Filmed(NamedTuple):
-    """Bars of filmed frames that replace bars of moments (filmed frames, and those made between them).
+    """The result of `filmed`: bars of filmed frames that replace the bars of moments in an older recipe.
 
     Attributes:
         bars: (L,).
-        lost: Where they expose other moments: the numbers, from 1, of the first and last moment of the filmed frame
-            that differs most. None: nowhere.
+        lost: None if the new bars expose the same moments as the old ones. Otherwise, the moments of the filmed frame
+            where they differ most: the numbers of the first and the last one, from 1.
     """
 
     bars: np.ndarray

@@ -66,8 +66,9 @@ def look(effect: PropertyGroup, snapshot: Snapshot, renderer: Renderer, request:
     """Tell from past measurements how far the picture moves between exposed frames. What is unknown is measured later.
 
     Returns:
-        The step from frame to frame in pixels of the footage; None: it is small enough for a streak, or not known yet.
-        And whether anything differs from the result of the last call.
+        The step from one frame to the next in pixels of the footage. None: it is small enough for a streak, not known
+        yet, or Smooth is on.
+        Whether the step, or whether the source repeats frames, differs from what the last call for this effect found.
     """
     _measuring.wanted, before = None, (last(effect), repeats(effect))
     frame, known = effect.id_data.frame_current, _step(effect, snapshot, renderer, request)
