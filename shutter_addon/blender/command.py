@@ -27,7 +27,8 @@ def main(argv: list[str]) -> int:
         argv: The arguments after the program's name, such as ["render", "a.mp4", "--output", "out"].
 
     Returns:
-        0 if it succeeded; 2 if not, after one sentence on stderr; film_output.INTERRUPTED (130) if it was stopped.
+        0 if it succeeded, and after --help. 2 if it failed: stderr then has the reason, in one sentence, or for `check`
+        a sentence for each fault. film_output.INTERRUPTED (130) if it was interrupted, as by Ctrl-C.
     """
     parser, arguments = _parser(), None
     try:

@@ -58,8 +58,14 @@ def run(arguments: Namespace) -> None:
 def _checked(arguments: Namespace, scene: Scene, frames: range) -> tuple[str, list[str], list[str]]:
     """Choose the render device, and look for everything that would make a render of these frames fail.
 
+    Args:
+        arguments: The parsed options of `check`.
+        scene: The scene of the opened edit.
+        frames: The timeline frames to render.
+
     Returns:
-        The device's name ("none" if there is none); notes, which do not prevent a render; faults, which do.
+        Three results: the device's name ("none" if there is none), the notes, and the faults. Notes and faults are
+        sentences for the user. Only faults prevent a render.
     """
     faults = [*_version_faults(scene), *_setting_faults(arguments, scene, frames)]
     device, lesser = "none", None

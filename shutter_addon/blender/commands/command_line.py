@@ -25,9 +25,12 @@ from ..rendering import render_job
 
 
 def to_path(text: str) -> Path:
-    """Return the absolute path of an option's text, as argparse's `type`.
+    """Return the absolute path that an option's text names. It is used as argparse's `type`.
 
-    Several leading slashes become one, because Blender takes two for the folder of the .blend file.
+    Several leading slashes become one, because Blender reads a leading // as "relative to the .blend file".
+
+    Raises:
+        ArgumentTypeError: The text is empty.
     """
     if not text:
         raise argparse.ArgumentTypeError("a name is missing")
@@ -59,7 +62,9 @@ def add_device(parser: argparse.ArgumentParser) -> None:
 
 
 def recipe(path: Path) -> Effect:
-    """Read the effect from a recipe, a JSON file. Print a warning if an older version gave it another picture.
+    """Read an effect from a recipe, which is a JSON file.
+
+    Print a warning if an older version wrote the recipe and this version cannot reproduce its picture exactly.
 
     Raises:
         RecipeError: The recipe is invalid.
@@ -80,9 +85,13 @@ def open_footage(path: Path) -> FrameSource:
 
 
 def files(medium: FrameSource) -> list[Path]:
-    """Return the paths that the footage reads, which a render must not overwrite.
+    """Return the paths of the footage's files, which a render must not overwrite.
 
-    For a sequence with gaps these include the missing files: if written, they would become part of it.
+    If an image sequence has gaps, the result includes the paths of its missing files: a file written there would become
+    part of the sequence.
+
+    Args:
+        medium: The opened footage.
     """
     files = medium.files
     beside = by_number(files[0], listed=True) if len(files) > 1 else None
@@ -97,18 +106,20 @@ def length(medium: FrameSource, source_recipe: Effect) -> int:
 
 
 def open_edit(path: Path, asked: str | None = None, name: str | None = None) -> tuple[Scene, range]:
-    """Open a saved edit without running its scripts.
+    """Open a saved edit (.blend) without running its scripts.
 
     Args:
-        asked: The text of `--frames`, as in `frames`; None: all frames of the scene.
-        name: The scene to use; None: the active one, which must have strips and no drivers that need scripts.
+        path: The .blend file.
+        asked: The text of the option `--frames`, which `frames` parses; None: all frames of the scene.
+        name: The scene to use. None: the active scene. Only that one is checked for having strips, and for having no
+            drivers that need scripts.
 
     Returns:
         The scene, and the timeline frames that were asked for.
 
     Raises:
-        UserError: The file cannot be opened, its scene is missing or set so that the sequencer is not rendered as it
-            is, or it has no such frames.
+        UserError: The file cannot be opened, there is no such scene, a check failed, or the scene lacks these frames.
+            Also if the render setting `use_sequencer` of the scene is off, or `use_multiview` (stereoscopy) is on.
     """
     if not path.is_file():
         raise UserError(f"{path}: " + ("is no file" if path.exists() else "no such file"))
@@ -160,12 +171,12 @@ def _has_strips(scene: Scene) -> bool:
 
 
 def frames(text: str | None, whole: range, what: str = "clip") -> range:
-    """Parse the option `--frames`.
+    """Parse the text of the option `--frames`.
 
     Args:
-        text: "A:B", "A-B" (as schedulers name chunks) or "A", last frame included; None: the whole range.
-        whole: The frames that can be asked for.
-        what: What has these frames, "clip" or "edit", for the error message.
+        text: "A:B" or "A-B" for the frames from A to B, including B; "A" for that frame alone; None: the whole range.
+        whole: All frames that exist.
+        what: What has these frames, "clip" or "edit". Only the error message uses it.
 
     Raises:
         OutputError: The text is malformed, or its frames are not within `whole`.
@@ -182,10 +193,12 @@ def frames(text: str | None, whole: range, what: str = "clip") -> range:
 
 
 def print_line(text: str) -> None:
-    """Print a text to stdout, with "?" for characters that the terminal's encoding lacks.
+    """Print a line to stdout, with "?" for characters that the encoding of stdout lacks.
+
+    If stdout is a pipe and its reader has ended, the line is dropped without an error.
 
     Raises:
-        OutputError: stdout cannot be written to; a pipe whose reader has gone is no error.
+        OutputError: Writing to stdout failed in any other way.
     """
     encoding = sys.stdout.encoding or "utf-8"
     try:

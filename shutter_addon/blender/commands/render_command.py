@@ -97,13 +97,15 @@ def _render_source(arguments: Namespace) -> None:
 
 
 def make_edit(path: Path, medium: FrameSource, source_recipe: Effect, folder: Path) -> Scene:
-    """Replace the open file by a new edit: one strip of footage with an effect strip above it. Return its scene.
+    """Replace Blender's open file by a new edit: a strip of footage with an effect strip above it. Return its scene.
+
+    Both strips begin at frame 1. A movie's sound gets a strip, too.
 
     Args:
-        path: File of the footage, by which its strips are named.
-        medium: The footage, opened; gives size, frame rate and files.
+        path: The movie, or the first file of the image sequence. The strips are named after it.
+        medium: The same footage, opened. Size, frame rate and list of files are read from it.
         source_recipe: The effect.
-        folder: Folder of the recipe, to which paths of mattes are relative.
+        folder: The recipe's folder. Paths of mattes in the recipe are relative to it.
 
     Raises:
         MediaError: A matte of the recipe cannot be read.
@@ -149,10 +151,11 @@ def _written(arguments: Namespace, file_format: str, frames: range) -> list[Path
 
 
 def _mattes(source_recipe: Effect, folder: Path) -> list[Path]:
-    """Open each matte that a recipe uses, and return their files.
+    """Return the paths of all files of the mattes in a recipe. Open each matte once, to check that it can be read.
 
     Args:
-        folder: Folder of the recipe, to which paths of mattes are relative.
+        source_recipe: The recipe's effect.
+        folder: The recipe's folder. Paths of mattes in the recipe are relative to it.
 
     Raises:
         MediaError: A matte is missing or cannot be read.
@@ -165,10 +168,10 @@ def _mattes(source_recipe: Effect, folder: Path) -> list[Path]:
 
 
 def _save(scene: Scene, path: Path) -> None:
-    """Save the edit to `path` with paths relative to its folder, so that it can be opened on another machine.
+    """Save the open file to `path`, with paths relative to its folder, so that another machine can open it.
 
     Raises:
-        OutputError: It cannot be saved whole; an older file at `path` stays.
+        OutputError: It could not be written completely. A file that was at `path` before is unchanged then.
     """
     try:
         film_output.make_folder(path.parent)
@@ -187,9 +190,9 @@ _PATHS = {"MOVIE": "filepath", "IMAGE": "directory", "SOUND": "filepath"}  # pat
 
 
 def _paths_relative(scene: Scene, folder: Path) -> AbstractContextManager[None]:
-    """Return a context in which the paths of the edit's strips, images and output are relative to `folder`.
+    """Return a context manager in which paths of the scene's strips, images and output are relative to `folder`.
 
-    Paths on another drive stay absolute. All paths are restored at the end.
+    Paths on another drive stay absolute. On exit, all paths are restored.
     """
     owners = [(scene.render, "filepath")]
     for strip in scene.sequence_editor.strips_all:

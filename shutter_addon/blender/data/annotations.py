@@ -30,14 +30,17 @@ def picture_size(effect: PropertyGroup) -> tuple[int, int]:
 
 @np.errstate(invalid="ignore")  # image_to_picture reports a result that is not finite
 def picture_to_image(strip: Strip, size: tuple[int, int], **moved: float) -> np.ndarray:
-    """Return the matrix (3, 3) from a strip's picture, in fractions 0 to 1, to the sequencer's image space.
+    """Return the matrix (3, 3) from a strip's picture to the sequencer's image space, by the strip's transform.
 
-    It follows the strip's transform. Blender scales and turns a strip about the transform's origin, then mirrors the
+    A point of the picture is given in fractions 0 to 1 of its width and height. Image space has pixels, with the origin
+    at the image's center and y up. Blender scales and turns a strip about the transform's origin, then mirrors the
     image.
 
     Args:
+        strip: The strip whose transform and mirroring count.
         size: The picture's width and height in pixels.
-        moved: Values by name of the transform's properties, in place of the strip's own; for keyed transforms.
+        moved: Values to use in place of the transform's own, by property name (see TRANSFORM), such as keyed ones at
+            some frame.
     """
     width, height = size
     x, y, scale_x, scale_y, rotation = (moved.get(name, getattr(strip.transform, name)) for name in TRANSFORM)
@@ -74,7 +77,11 @@ def image_to_region(region: Region) -> np.ndarray:
 
 
 def image_to_picture(strip: Strip, size: tuple[int, int], **moved: float) -> np.ndarray | None:
-    """Return the inverse of picture_to_image, with its arguments; None: the strip is shown too small for scribbles.
+    """Return the inverse of the matrix (3, 3) that picture_to_image gives for the same arguments.
+
+    Returns:
+        The matrix. None if the strip is shown so small that a side of its picture has fewer than 4 pixels: strokes
+        cannot be placed on it.
 
     Raises:
         EffectError: A number of the strip's transform is not finite.
@@ -88,9 +95,12 @@ def image_to_picture(strip: Strip, size: tuple[int, int], **moved: float) -> np.
 
 
 def strokes_of(drawing: AnnotationFrame) -> list[np.ndarray]:
-    """Return the strokes that an annotation layer has at one frame, each as points (n, 2) float64 in image space.
+    """Return the strokes of one drawing of an annotation layer, each as points (n, 2) float64 in image space.
 
-    Empty strokes are left out.
+    Strokes without points are left out.
+
+    Args:
+        drawing: What the layer shows from one frame on.
     """
     strokes = [numbers(stroke.points, "co", size=3)[:, :2].astype(np.float64) for stroke in drawing.strokes]
     return [points for points in strokes if len(points)]

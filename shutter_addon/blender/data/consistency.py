@@ -14,17 +14,21 @@ from .selection import active_region, own_regions
 
 
 def changed(group: PropertyGroup, _context: Context) -> None:
-    """Have the effect's frames made again after a property changed, as its update callback.
+    """Make Blender render the frames of a scene's effect strips again. It is an update callback of properties.
 
-    Blender's sequencer keeps finished frames and does not know that they depend on the property.
+    Blender's sequencer caches finished frames and does not know that they depend on the property.
+
+    Args:
+        group: The property group that has the changed property. All effects of its scene are rendered again.
     """
     strips.invalidate(group.id_data)
 
 
 def choose_region(effect: PropertyGroup) -> None:
-    """Make a region of the active shutter active, the nearest in order, unless one already is.
+    """Make sure that the active region belongs to the active shutter, since the list of regions shows no others.
 
-    The list of regions shows only those of the active shutter.
+    If it does not, activate the region of the active shutter whose index is nearest. Do nothing if the shutter has no
+    regions.
     """
     own = own_regions(effect)
     if own and effect.active_region not in own:
@@ -34,8 +38,11 @@ def choose_region(effect: PropertyGroup) -> None:
 def aim_pen(effect: PropertyGroup, name: str = "layer") -> None:
     """Make Blender's annotation tool draw on an annotation layer of the active region.
 
+    Do nothing if there is no active region, or it does not have that layer.
+
     Args:
-        name: One of annotations.LAYERS: which of the region's layers.
+        effect: The effect.
+        name: The region's property that names the layer: one of annotations.LAYERS.
     """
     region = active_region(effect)
     layer = layer_of(effect, region, name) if region else None
@@ -45,9 +52,9 @@ def aim_pen(effect: PropertyGroup, name: str = "layer") -> None:
 
 
 def unique(name: str, taken: Container[str]) -> str:
-    """Return a name that is not in `taken`: the name itself, or with a number, as in "Name.001".
+    """Return a name that is not in `taken`: `name` itself, or `name` with a number at the end, as in "Name.001".
 
-    It has at most limits.MAX_NAME characters, as in recipes.
+    The result has at most limits.MAX_NAME characters. If necessary, `name` is cut.
     """
     number, wanted = 0, name[: limits.MAX_NAME]
     while wanted in taken:
@@ -58,11 +65,15 @@ def unique(name: str, taken: Container[str]) -> str:
 
 
 def rename(effect: PropertyGroup, old: str, new: str) -> str:
-    """Return the name to give a renamed shutter, made unique, and enter it in the regions of the shutter.
+    """Return a unique name for a shutter that the user renames, and give it to the regions that use the shutter.
+
+    Regions refer to their shutter by name. If another shutter still has the old name, this shutter is its copy, and the
+    regions stay with the other one.
 
     Args:
+        effect: The effect that has the shutter.
         old: The shutter's name until now.
-        new: The name that was typed.
+        new: The name that the user typed.
     """
     others = [shutter.name for shutter in effect.shutters]
     others.remove(old)
@@ -76,12 +87,14 @@ def rename(effect: PropertyGroup, old: str, new: str) -> str:
 
 
 def refollow(effect: PropertyGroup, old: str, new: str | None) -> None:
-    """Update the shutters whose exposure follows a region, after it was renamed or removed.
+    """Update the shutters whose exposure follows a region, after the region was renamed or removed.
 
-    Nothing changes if another region still has the old name.
+    Shutters refer to the region by name. Nothing changes if another region still has the old name.
 
     Args:
-        new: The region's new name; None: it was removed, and the shutters follow nothing.
+        effect: The effect that has the region.
+        old: The region's name before.
+        new: The region's new name. None: it was removed, so the shutters follow nothing from now on.
     """
     if [region.name for region in effect.regions].count(old) > (0 if new is None else 1):
         return
@@ -98,10 +111,12 @@ def bars(shutter: PropertyGroup) -> np.ndarray:
 
 
 def fit_bars(effect: PropertyGroup) -> None:
-    """Fit all shutters' bars (how much each frame counts) after the window's length or position has changed.
+    """Adapt the bars of all shutters after the length of the effect's window, or its position, has changed.
 
-    A shutter whose bars are still those of its preset gets the preset's bars for the new window. Any other loses its
-    preset; its bars, at keys too, are resampled, which keeps their shape and their share of the light.
+    A shutter has a bar for each frame of the window: how much that frame contributes. If the bars are still those of
+    the shutter's preset, they become the preset's bars for the new window. Otherwise the shutter no longer counts as
+    having a preset. If the length has changed, its bars are resampled, at each key, too: their shape and mean height
+    stay.
     """
     for index, shutter in enumerate(effect.shutters):
         shutter.preset = preset_of(effect, index)
@@ -114,7 +129,10 @@ def fit_bars(effect: PropertyGroup) -> None:
 
 
 def count_filmed(effect: PropertyGroup) -> None:
-    """Convert an effect of format 1, whose bars counted moments between frames, too, to bars of the footage's frames.
+    """Convert the bars of an effect in data format 1 to the current meaning: a bar for each filmed frame of the window.
+
+    In format 1 there was a bar for each moment: each filmed frame, and each frame computed between two of them. The
+    effect's window becomes shorter accordingly.
 
     Raises:
         EffectError: A value is out of range.
@@ -133,9 +151,13 @@ def count_filmed(effect: PropertyGroup) -> None:
 
 
 def preset_of(effect: PropertyGroup, index: int) -> str:
-    """Return the preset that a shutter still has, a key of shutters.PRESETS; "": it has none.
+    """Return the preset (a key of shutters.PRESETS) whose bars a shutter still has; "": it has none.
 
-    It has its last preset as long as its bars are neither edited nor keyed.
+    It has none if its bars were changed since the preset was chosen, or have F-curves.
+
+    Args:
+        effect: The effect.
+        index: The shutter's index.
     """
     shutter, weights = effect.shutters[index], bars(effect.shutters[index])
     if shutter.preset not in shutters.PRESETS or not weights.size:
@@ -147,11 +169,13 @@ def preset_of(effect: PropertyGroup, index: int) -> str:
 
 
 def _change_bars(effect: PropertyGroup, index: int, change: Callable[..., np.ndarray]) -> None:
-    """Replace a shutter's bars (how much each frame counts) by `change(bars)`, also at each key.
+    """Replace a shutter's bars by the results of a function, also at each key if the bars have keys.
 
     Args:
-        index: Of the shutter.
-        change: Takes the bars (L,) and returns new ones, maybe of another number.
+        effect: The effect.
+        index: The shutter's index.
+        change: Takes the bars (L,): how much each frame counts. It returns the new bars, which may have another length,
+            the same one in all calls.
     """
     shutter = effect.shutters[index]
     scene, path = effect.id_data, f"{effect.path_from_id()}.shutters[{index}].bars"
@@ -170,11 +194,14 @@ def _change_bars(effect: PropertyGroup, index: int, change: Callable[..., np.nda
 
 
 def _bars_keyed(old: np.ndarray, keyed: dict[int, FCurve], frame: float) -> np.ndarray:
-    """Return a shutter's bars (L,) at a timeline frame: the values of F-curves, at least 0, and `old` for the others.
+    """Return a shutter's bars (L,) at a timeline frame: those with an F-curve evaluated, the others as stored.
+
+    Negative values of F-curves become 0.
 
     Args:
         old: The stored bars (L,).
-        keyed: F-curves by the index of their bar.
+        keyed: The F-curves by the index of their bar.
+        frame: The timeline frame.
     """
     weights = old.copy()
     weights[list(keyed)] = [max(curve.evaluate(frame), 0.0) for curve in keyed.values()]

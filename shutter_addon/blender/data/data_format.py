@@ -26,12 +26,15 @@ def is_file_newer() -> bool:
 
 
 def new_effect(scene, number: int):
-    """Add an effect to a scene and return it. Set the scene's format to the oldest of its effects', unless it is newer.
+    """Add an empty effect to a scene, and return it.
 
-    The format is set at once because no handler runs before an autosave.
+    The scene's data format becomes the oldest of its effects' formats, so that `migrate` converts them all. If a newer
+    version of the extension saved the scene, its format stays. It is set here because no handler runs before an
+    autosave.
 
     Args:
-        number: Format of the data that the effect will be filled with.
+        scene: The scene.
+        number: The format of the data that the caller will fill the effect with.
     """
     group = scene.virtual_shutter
     if not is_newer(scene):
@@ -40,9 +43,10 @@ def new_effect(scene, number: int):
 
 
 def migrate() -> None:
-    """Convert all effects of the loaded file to the current format, and mark their scenes with it.
+    """Convert all effects to the current data format, and set the format of their scenes.
 
-    Done on loading, because no handler runs before an autosave.
+    Linked scenes are left out. This is done when a file was loaded, because no handler runs before an autosave. It must
+    not be called if a newer version saved the file (`is_file_newer`).
     """
     for group in [scene.virtual_shutter for scene in _scenes_with_effects()]:
         for effect in group.effects if group.format < 2 else ():
@@ -53,9 +57,13 @@ def migrate() -> None:
 
 
 def stamp_saved(version: str) -> None:
-    """Write the extension's version into all scenes with effects, before the file is saved.
+    """Write the extension's version into all scenes with effects. It is called before a file is saved.
 
-    Their format stays: a scene that was appended from an older file migrates when the file is loaded.
+    The scenes' data format stays as it is: an effect that was appended from an older file is converted by `migrate`
+    when the file is loaded next.
+
+    Args:
+        version: The extension's version.
     """
     for scene in _scenes_with_effects():
         scene.virtual_shutter.version = version

@@ -18,7 +18,7 @@ import numpy as np
 
 
 class Movie:
-    """A movie that is open in Blender as an image. Frames count from 0."""
+    """A movie file that Blender decodes, opened as an image data-block."""
 
     def __init__(self, path: str, deinterlace: bool) -> None:
         self._path = path
@@ -34,7 +34,11 @@ class Movie:
         bpy.data.images.remove(self._image)
 
     def about(self) -> dict:
-        """Return the movie's size, number of frames, frame rate, and whether it has alpha, deep samples or audio.
+        """Return what is known of the movie.
+
+        Returns:
+            By name: "size" (width and height in pixels), "count" (number of frames), "fps" (frame rate), and whether it
+            has "alpha", "deep" samples (more than 8 bits) and "audio".
 
         Raises:
             RuntimeError: The file is no movie that Blender can decode.
@@ -58,7 +62,10 @@ class Movie:
             bpy.data.sounds.remove(sound)
 
     def frame(self, index: int) -> np.ndarray:
-        """Return a frame as RGBA (H, W, 4), top row first: uint8, or uint16 for movies with deeper samples.
+        """Return a frame as RGBA (H, W, 4), top row first: uint8, or uint16 for more than 8 bits per sample.
+
+        Args:
+            index: The frame's number, from 0.
 
         Raises:
             RuntimeError: Blender cannot decode it.
@@ -81,13 +88,19 @@ class Movie:
 def _answer(
     movies: dict[int, Movie], wanted: str | int, number: int, path: str, deinterlace: bool
 ) -> tuple[dict, np.ndarray | None]:
-    """Do what a question asks; the arguments are its fields.
+    """Do what a question asks. A movie that is not open yet is opened. One that fails is closed.
 
     Args:
-        movies: The open movies by number, to which a new one is added.
+        movies: The open movies by their numbers. Entries are added and removed.
+        wanted: What to do: "about" (describe the movie), "close", or a frame's index from 0.
+        number: The movie's number, which the asking process has chosen.
+        path: The movie's file.
+        deinterlace: Whether Blender deinterlaces the movie.
 
     Returns:
-        The answer's JSON as a dictionary, with "error" if it failed, and the frame, or None.
+        The dictionary to answer as JSON, and a frame. The dictionary has the movie's data for "about", is empty for
+        "close", has "shape" and "dtype" of a frame, or only "error", a message. The frame is None unless one was asked
+        for and read.
     """
     try:
         if wanted == "close":

@@ -33,22 +33,31 @@ _BEZIER = 2  # of Keyframe.interpolation as a number; those above have parameter
 
 
 def frames_of(strip: Strip) -> range:
-    """Return the frames that an effect strip shows, counted from strips.origin.
+    """Return the frames that an effect strip covers; 0 is strips.origin, the start of its untrimmed content.
 
-    That is where its content would start untrimmed, so the parts of a cut strip have comparable frames.
+    All parts of a cut strip have the same origin, so the numbers of their frames can be compared.
     """
     start = round(strips.origin(strip))
     return range(strip.left_handle - start, strip.right_handle - start)
 
 
 def key(scene: Scene, effect: PropertyGroup, strip: Strip, frames: range) -> str:
-    """Return 16 hexadecimal digits that identify an effect's pictures, by its settings and the contents of files.
+    """Return a hash of all that an effect's pictures depend on, so that a bake notices when it is out of date.
+
+    The hash covers the settings and the contents of files. It stays the same if strips move on the timeline, or files
+    move on disk.
 
     Args:
-        frames: Counted as in frames_of.
+        scene: The scene that has the effect.
+        effect: The effect.
+        strip: The effect strip.
+        frames: The frames that are or will be baked, numbered as in frames_of.
+
+    Returns:
+        16 hexadecimal digits.
 
     Raises:
-        EffectError, MediaError: The effect cannot be shown.
+        EffectError, MediaError: The effect cannot be rendered, for example because it has no source.
     """
     start = round(strips.origin(strip))
     snapshot.check_counts(effect)
@@ -66,9 +75,10 @@ def key(scene: Scene, effect: PropertyGroup, strip: Strip, frames: range) -> str
 
 
 def preview_key(scene: Scene, effect: PropertyGroup, strip: Strip) -> int:
-    """Return a number that changes with what an effect's pictures depend on, where Blender does not report a change.
+    """Return a hash that changes when an effect's pictures change for a reason that Blender does not report.
 
-    So properties with an update callback do not count. It is asked for often, so files count by path, size and time.
+    Previews ask for it often, and drop their finished frames when it changes. So it does not read files: it uses their
+    paths, sizes and times. It leaves out properties that have an update callback, since that drops the frames, too.
     """
     source = strips.nearest_source(scene, effect, strip)
     lies = None if source is None else (source.left_handle, _source(effect, source, _stamps, 0))
@@ -88,15 +98,17 @@ def is_changed(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
 
 
 def parts(effect: PropertyGroup, strip: Strip, files: Files, start: int | None = None) -> Iterator[Hashable]:
-    """Yield all that an effect's pictures depend on, except the source and properties with an update callback.
+    """Yield what an effect's pictures depend on, apart from the source and properties with an update callback.
 
-    These are bars, regions, strokes, mattes, F-curves and the strip's transform. The values of keyed properties do not
-    count, since they change with every frame that plays.
+    That is: numbers of bars, regions, strokes, mattes, F-curves and the strip's transform. Of keyed properties, the
+    F-curves are yielded but not the current value, which changes with every frame that plays.
 
     Args:
-        files: Identifies the files of a strip or of an image matte: `_stamps` or `_contents`.
-        start: Timeline frame to count frames from, so that moved strips give the same; None: count as the timeline
-            does.
+        effect: The effect.
+        strip: The effect strip.
+        files: Returns a value that identifies the files of a strip or an image matte: `_stamps` or `_contents`.
+        start: The timeline frame from which frames are counted, so that the result does not change if all strips move
+            together. None: frames are those of the timeline.
     """
     scene, names = effect.id_data, [shutter.name for shutter in effect.shutters]
     yield tuple(len(shutter.bars) for shutter in effect.shutters)
@@ -116,19 +128,25 @@ def parts(effect: PropertyGroup, strip: Strip, files: Files, start: int | None =
 
 
 def _source(effect: PropertyGroup, source: Strip, files: Files, start: int) -> Hashable:
-    """Return what identifies the frames of an effect's source, and which of them it shows when.
+    """Return what identifies the source's footage, and which of its frames is shown at which time.
 
     Args:
+        effect: The effect.
+        source: The source strip.
         files: As in `parts`.
-        start: Timeline frame to count frames from.
+        start: The timeline frame from which frames are counted.
+
+    Returns:
+        The strip's timing, and what `files` returns. The timing is None if *Custom Time* of the effect replaces it.
     """
     return None if effect.use_source_time else timing(source, start), files(source)
 
 
 def _settings(effect: PropertyGroup) -> Iterator[Hashable]:
-    """Yield names and values of an effect's properties that pictures depend on, except those with keys.
+    """Yield names and values of the properties without F-curves that an effect's pictures depend on.
 
-    Names and colors do not count; names that refer to something count as its index.
+    Names and colors of the effect's items are left out. Where a property names another item, such as the region that a
+    shutter follows, that item's index is yielded in place of its name.
     """
     path, followed = effect.path_from_id(), [region.name for region in effect.regions]
     curves = filter(fcurves.drives, fcurves.curves_under(effect.id_data, path + "."))
@@ -163,9 +181,11 @@ def _setting_names(*kinds: type) -> list[str]:
 
 
 def _curves(owner: Scene, path: str, start: int | None) -> Iterator[Hashable]:
-    """Yield paths, keys, handles and modifiers of the F-curves whose path starts with `path`, ordered by path.
+    """Yield paths, keys, handles and modifiers of the F-curves of a scene under a data path, in a fixed order.
 
     Args:
+        owner: The scene.
+        path: F-curves whose data path starts with this count. It is removed from the yielded paths.
         start: As in `parts`.
     """
     for curve in sorted(fcurves.curves_under(owner, path), key=lambda curve: (curve.data_path, curve.array_index)):
@@ -195,9 +215,12 @@ def _strokes(effect: PropertyGroup, region: PropertyGroup, start: int | None) ->
 
 
 def _matte(region: PropertyGroup, files: Files, start: int | None) -> Iterator[Hashable]:
-    """Yield what a region's matte shows: its files, strips or mask. Properties of the region itself are not included.
+    """Yield what a region's matte depends on: its files, the matte strips with their timing, or its mask.
+
+    Properties of the region itself are not included. If the matte is missing, the error message is yielded.
 
     Args:
+        region: A region whose kind is "MATTE".
         files: As in `parts`.
         start: As in `parts`.
     """
@@ -217,10 +240,13 @@ def _matte(region: PropertyGroup, files: Files, start: int | None) -> Iterator[H
 
 
 def timing(strip: Strip, start: int = 0) -> StripTiming:
-    """Return when a movie, image or clip strip shows which of its frames, whatever its name and cuts.
+    """Return which of its frames a movie, image or clip strip shows at which time. Equal results show the same.
+
+    The result does not depend on the strip's name, or on where it was cut.
 
     Args:
-        start: Timeline frame that its start and end are counted from.
+        strip: The strip.
+        start: The timeline frame from which the start and end of its content are counted.
     """
     lies = source_media.timing_of(strip)
     begins, ends = lies.content_start - start, lies.content_end - start
@@ -228,9 +254,12 @@ def timing(strip: Strip, start: int = 0) -> StripTiming:
 
 
 def _stamps(owner: Strip | PropertyGroup) -> Hashable:
-    """Return a value that changes when the files of a strip or an image matte change, by their stamps on disk.
+    """Return a value that identifies the files of a strip or an image matte, by paths, sizes and modification times.
 
-    If they cannot be found, the value is the error message.
+    If the files cannot be found, the value is the error message.
+
+    Args:
+        owner: The strip, or the region that has the matte.
     """
     try:
         return source_media.media_key(owner) if isinstance(owner, Strip) else matte_content.image_file(owner)
@@ -239,10 +268,16 @@ def _stamps(owner: Strip | PropertyGroup) -> Hashable:
 
 
 def _contents(owner: Strip | PropertyGroup) -> Hashable:
-    """Return how the files of a strip or an image matte are read, and digests of their contents.
+    """Return a value that identifies the files of a strip or an image matte, by their contents.
+
+    Args:
+        owner: The strip, or the region that has the matte.
+
+    Returns:
+        How the files are read, and a digest of each. A missing file has "missing: NAME" in place of the digest.
 
     Raises:
-        EffectError, MediaError: It has no files.
+        EffectError, MediaError: The strip or the region has no files.
     """
     if isinstance(owner, Strip):
         spec = source_media.spec(owner)

@@ -16,9 +16,12 @@ from . import requirements, strips
 
 
 def named(item: ID) -> list[Path]:
-    """Return the files that a data-block names: several for a tiled image, only the first for an image sequence.
+    """Return the paths of the files that a data-block uses; empty if it is packed, generated or has no file.
 
-    Packed and generated images have none.
+    A tiled image has a file for each tile. Of an image sequence, only the file whose path Blender stores is returned.
+
+    Args:
+        item: A data-block with a file path, such as an image, clip, font or library.
     """
     source = getattr(item, "source", "FILE")
     if source in ("GENERATED", "VIEWER") or item.filepath in ("", "<builtin>") or getattr(item, "packed_file", None):
@@ -38,11 +41,12 @@ def every(item: ID) -> list[Path]:
 
 
 def absolute(owner: ID | Strip, path: str) -> Path:
-    """Return the absolute path of a file that a data-block or a strip names.
+    """Return the absolute path of a file that a data-block or a strip uses.
 
     Args:
-        owner: The data-block or strip; a path that begins with // is relative to the .blend file that has it.
-        path: As stored.
+        owner: The data-block or the strip. A path that begins with // is relative to its .blend file, which may be a
+            linked library.
+        path: The path as it is stored, for example in `filepath`.
     """
     library = owner.library if isinstance(owner, bpy.types.ID) else owner.id_data.library
     return Path(bpy.path.abspath(path, library=library))
@@ -56,13 +60,15 @@ def relative(path: str) -> str:
 
 
 def faults(scene: Scene, frames: range, *, sources: bool) -> list[str]:
-    """Return a sentence for each file that is missing or unreadable and that pictures at these timeline frames need.
+    """Return a sentence for each missing or unreadable file that pictures at these timeline frames need.
 
-    These are files of movie, image and clip strips, of images, volumes, caches and fonts that are shown, and of
-    libraries. Edits in Scene strips count at all their frames. Files of mattes are left out.
+    These are files of movie, image and clip strips, of images, volumes, caches and fonts that are used, and of all
+    libraries. Files of mattes are not checked. In scenes that Scene strips show, all frames count.
 
     Args:
-        sources: Include the source strips of effects, as far as they are shown themselves.
+        scene: The scene that is rendered.
+        frames: Its timeline frames.
+        sources: Whether to check source strips of effects, too, where they lie unmuted.
     """
     sentences = _of_strips(scene, frames, strips.SOURCES, sources=sources)
     used, data = requirements.used_data(scene, frames), bpy.data
@@ -102,10 +108,13 @@ def _of_strip(strip: Strip, frames: range) -> Iterator[str]:
 
 
 def _of_item(item: ID, check: Callable = check_file) -> Iterator[str]:
-    """Yield a sentence for each fault of a data-block's files; of an image sequence only the first file is checked.
+    """Yield a sentence for each missing or unreadable file of a data-block.
+
+    Of an image sequence, only the first file is checked.
 
     Args:
-        check: Takes a file's path and raises MediaError if it is missing or unreadable.
+        item: The data-block.
+        check: Called with each path. It raises a MediaError if the file is missing or unreadable.
     """
     for path in named(item):
         yield from raised(check, path)

@@ -27,7 +27,11 @@ def stretched(scene) -> float:
 
 
 class Timed:
-    """An F-curve whose methods take and return frames of the timeline, where *Time Stretching* makes them differ."""
+    """An F-curve whose `evaluate`, `points` and `insert` use timeline frames, for scenes with *Time Stretching*.
+
+    Keys of F-curves count unstretched frames, which then differ from timeline frames. All other attributes are the
+    F-curve's own.
+    """
 
     def __init__(self, curve, scene):
         self._curve, self._pace = curve, stretched(scene)
@@ -51,7 +55,7 @@ class Timed:
 
 
 class Curves:
-    """The F-curves of a scene by data path. Muted and empty ones are left out, since they have no effect."""
+    """The F-curves of a scene, found by data path, in timeline frames. Muted and empty ones are left out."""
 
     def __init__(self, scene):
         self._pace = stretched(scene)
@@ -59,14 +63,14 @@ class Curves:
         self._curves = {(c.data_path, c.array_index): c if self._pace == 1 else Timed(c, scene) for c in found}
 
     def find(self, path: str, index: int = 0):
-        """Return the F-curve of a property.
+        """Return the F-curve of a property, or None if it has none that is in effect.
 
         Args:
             path: Data path of the property from the scene.
-            index: Component of a vector; else 0.
+            index: Component of a vector; 0 for a single number.
 
         Returns:
-            None if the property has none that is in effect.
+            Blender's F-curve, or with *Time Stretching* a Timed that wraps it.
         """
         return self._curves.get((path, index))
 
@@ -83,10 +87,16 @@ class Curves:
         return [curve for curve in all_curves if curve is not None]
 
     def keys(self, curves: list) -> tuple[tuple[float, Ease], ...]:
-        """Return the timeline frames at which any of the curves has a key, ascending, each with its ease.
+        """Return the frames of all keys of some F-curves, ascending, each with its ease.
 
-        The ease says how values go on to the next key: "constant", "linear" or "bezier". The first curve with a key on
-        a frame gives it.
+        The ease is the interpolation up to the next key: "constant", "linear" or "bezier". If several curves have a key
+        on the same frame, the first curve in the list decides.
+
+        Args:
+            curves: F-curves that `find` or `of` returned.
+
+        Returns:
+            For each key, its timeline frame and its ease.
         """
         eases: dict[float, Ease] = {}
         for curve in curves:
@@ -96,14 +106,18 @@ class Curves:
         return tuple(sorted(eases.items()))
 
     def value(self, owner, path: str, name: str, frame: float):
-        """Return a float property, or a vector as a list, at a timeline frame, evaluated where it has F-curves.
+        """Return the value of a float property, or of a vector as a list, at a timeline frame.
+
+        Where there is an F-curve, its value counts, clamped to the property's range; otherwise the stored value.
 
         Args:
             owner: The struct that has the property.
             path: Data path of `owner` from the scene.
+            name: Name of the property.
+            frame: The timeline frame.
 
         Raises:
-            EffectError: A value is out of the property's range.
+            EffectError: A stored value is out of the property's range, or a value is not a number.
         """
         value = getattr(owner, name)
         if isinstance(value, float):
@@ -145,13 +159,14 @@ def progress(curve, first: float, last: float, frame: float) -> float:
 
 
 def set_keys(scene, path: str, index: int, keys: Sequence[tuple[float, float, Ease]], group: str = "") -> None:
-    """Give a property an F-curve with these keys, in place of any it has.
+    """Give a property an F-curve with these keys, in place of any that it has.
 
     Args:
+        scene: The scene that has the property.
         path: Data path of the property from the scene.
-        index: Component of a vector; else 0.
-        keys: For each key the timeline frame, the value, and the ease up to the next key.
-        group: Name of the channel group that animation editors show; "": none.
+        index: Component of a vector; 0 for a single number.
+        keys: For each key its timeline frame, its value, and the ease: the interpolation up to the next key.
+        group: Name of the channel group that Blender's animation editors show it in; "": in none.
     """
     pace = stretched(scene)
     keys = [(frame * pace, value, ease) for frame, value, ease in keys]
@@ -218,9 +233,14 @@ def copy_curves(scene, path: str, new_scene, new_path: str) -> None:
 
 
 def remove_item(owner: PropertyGroup, collection: str, index: int) -> None:
-    """Remove an item from a collection of a scene's property group, with its F-curves.
+    """Remove an item from a collection property, together with its F-curves.
 
-    The F-curves of later items follow them to their new index.
+    Data paths contain an item's index. So the F-curves of later items are changed to their new indices.
+
+    Args:
+        owner: The property group that has the collection. It is stored on a scene, which has the F-curves.
+        collection: Name of the collection property.
+        index: The item's index.
     """
     last = len(getattr(owner, collection)) - 1
     move_item(owner, collection, index, last)

@@ -31,10 +31,16 @@ _MOMENTS = 16  # steps from a filmed frame to the next
 
 
 def content(sampling: Sampling, region: PropertyGroup, moves: Moves) -> Channel:
-    """Return what a matte or ramp region shows over time: files, a mask or a gradient.
+    """Return the mattes of a matte or ramp region, as a channel: its `at(frame)` gives the matte at a timeline frame.
 
     Args:
-        moves: The region's motion, which places a gradient.
+        sampling: Reads the effect's properties.
+        region: A region whose kind is "MATTE" or "RAMP".
+        moves: The region's motion, by which a gradient is placed.
+
+    Returns:
+        By the region's settings: the frames of files or strips, a fixed mask, a gradient, or for a luminance ramp the
+        source's own luminance.
 
     Raises:
         EffectError, MediaError: The region has no matte, or its files cannot be found.
@@ -60,7 +66,14 @@ def _source(sampling: Sampling) -> Strip:
 
 
 def tracked(sampling: Sampling) -> dict[str, Any]:
-    """Return what a CarriedFile (mattes tracked through footage) is made with: the footage and a folder for mattes.
+    """Return arguments for a CarriedFile, which makes the mattes of tracked outlines and subjects.
+
+    Args:
+        sampling: Reads the effect's properties.
+
+    Returns:
+        "footage": the source as SourceSpec. "folder": where mattes are stored, beside the .blend file, or in Blender's
+        temporary folder if that was never saved.
 
     Raises:
         EffectError, MediaError: The effect has no source strip, or its files cannot be found.
@@ -70,10 +83,13 @@ def tracked(sampling: Sampling) -> dict[str, Any]:
 
 
 def channel(region: PropertyGroup) -> str:
-    """Return which channel of a picture is the matte, as recipes name it: "luminance", "alpha" … or an EXR channel.
+    """Return which channel of an image a region's matte uses, in the words of recipes.
+
+    Returns:
+        "luminance", "red", "green", "blue", "alpha", or the name of a channel of an EXR file.
 
     Raises:
-        EffectError: A named channel is wanted, and no name is given.
+        EffectError: The region uses a named channel, but the name is empty.
     """
     word = validation.word(region, "channel")
     if word != "NAMED":
@@ -99,10 +115,10 @@ def image_path(region: PropertyGroup) -> Path:
 
 
 def image_file(region: PropertyGroup) -> MatteFile:
-    """Return a region's matte file with what says how it is read. Its stamp changes when the file does.
+    """Return a region's image matte as MatteFile: its path, its channel, and a stamp that changes when a file changes.
 
     Raises:
-        EffectError, MediaError: The region has no such file.
+        EffectError, MediaError: The region has no image that is a file on disk.
     """
     path = image_path(region)
     is_sequence = region.image.source == "SEQUENCE"
@@ -114,9 +130,15 @@ def image_file(region: PropertyGroup) -> MatteFile:
 
 
 def filmed_frames(sampling: Sampling) -> dict[float, int]:
-    """Return which frame of the source's footage, from 0, is shown at each timeline frame that is sampled.
+    """Return the footage's frame that the source shows at each sampled timeline frame.
 
-    With *Smooth*, a time between two frames of the footage counts as the first of them.
+    With *Smooth*, a time between two frames of the footage gives the earlier one.
+
+    Args:
+        sampling: Reads the effect's properties, and gives the timeline frames.
+
+    Returns:
+        By timeline frame, the index of the frame in the footage, from 0.
 
     Raises:
         EffectError, MediaError: The effect has no source strip, or its movie cannot be read.
@@ -131,7 +153,12 @@ def filmed_frames(sampling: Sampling) -> dict[float, int]:
 
 @lru_cache(64)
 def _movie(spec: source_media.SourceSpec) -> tuple[int, Fraction | None]:
-    """Return a movie's number of frames and frame rate, from the file, since a retimed strip has another length.
+    """Return a movie's number of frames and its frame rate (None: unknown), read from the file.
+
+    The strip does not tell: retiming changes its length.
+
+    Args:
+        spec: The footage, a movie.
 
     Raises:
         MediaError: The movie cannot be read.
@@ -151,10 +178,11 @@ def _strip_frames(sampling: Sampling, region: PropertyGroup) -> Channel:
 
 
 def _of_strip(strip: Strip, word: str) -> MatteFile:
-    """Return the footage of a movie, image or clip strip as a matte file.
+    """Return a MatteFile that reads the footage of a movie, image or clip strip.
 
     Args:
-        word: The channel to read, as in `channel`.
+        strip: The strip.
+        word: The channel that is the matte, as in `channel`.
 
     Raises:
         MediaError: The strip has no files.
@@ -169,9 +197,14 @@ def strip_name(region: PropertyGroup) -> str:
 
 
 def choose_strip(region: PropertyGroup, name: str) -> None:
-    """Make the strip with this name a region's matte, together with the parts that it was cut into.
+    """Make the strip with this name a region's matte, and with it the other parts if it was cut.
 
-    If there is no such strip, the region loses its matte strip.
+    A region stores an identity, which its matte strips have, too. Copies of the strip get no part in it. If there is no
+    such strip, the region has no matte strip any more.
+
+    Args:
+        region: The region.
+        name: The strip's name.
     """
     editor = region.id_data.sequence_editor
     strip = editor and editor.strips_all.get(name)
@@ -206,9 +239,10 @@ def strips_of(region: PropertyGroup) -> list:
 
 
 def parts_for(region: PropertyGroup, effect_strip: Strip) -> list:
-    """Return the parts and copies of a region's matte strip that share frames with the effect strip.
+    """Return those of a region's matte strips (several if one was cut or copied) that overlap the effect strip in time.
 
-    If none does, only the nearest one. They are sorted by how near they begin to the effect strip's beginning.
+    If none does, return only the one nearest in time. The result is sorted by distance from the effect strip's first
+    frame to their first frame.
 
     Raises:
         EffectError: The region has no matte strip.

@@ -20,11 +20,15 @@ _PLAIN_SPACE = {"display_mode": "IMAGE", "display_channel": 0, "show_overexposed
 
 
 class Shown(NamedTuple):
-    """The effect strip that a preview shows.
+    """The effect strip that a preview shows at the playhead.
 
     Attributes:
-        strips_above: Whether there are strips in channels above, which may hide it.
-        hides_strokes: For each region with strokes, whether its annotation layer is hidden.
+        scene: The scene that has the strip and its effect.
+        effect: The effect.
+        strip: The effect strip.
+        strips_above: Whether visible strips lie in higher channels; they may cover it.
+        hides_strokes: For each region with strokes (all but mattes and ramps), in order, whether the user has hidden
+            its annotation layer.
     """
 
     scene: Scene
@@ -38,9 +42,11 @@ class Look(NamedTuple):
     """How the previews of a scene show an effect's picture.
 
     Attributes:
-        scale: Preview pixels for each pixel of the source, in the largest preview, 1.0 at full size; None: no preview.
-        proxy: The proxy that Blender reads of the source for that preview; None: the footage itself.
-        is_plain: Whether all previews show the strip's picture unchanged, so that it may be drawn over them.
+        scale: Screen pixels per pixel of the effect's picture in the largest preview: 1.0 at full size. With *Live*
+            off, the preview's resolution counts instead. None: no preview shows the scene.
+        proxy: The proxy file that Blender reads for the source in that preview. None: it reads the footage itself, or
+            there is no preview.
+        is_plain: Whether all previews show the strip's picture unchanged. Then a result may be drawn over it.
     """
 
     scale: float | None
@@ -82,13 +88,15 @@ def preview_region(area: Area) -> bpy.types.Region:
 
 
 def shown(context: Context, channel: int = 0) -> Shown | None:
-    """Return the effect strip that the context's preview shows at the playhead (selection.seen).
+    """Return the effect strip that the context's preview shows at the playhead; None: there is none.
 
     Args:
-        channel: The value that the preview's setting *Display Channel* must have. It is 0 in a preview of all channels.
+        context: A context of a sequencer area with a preview.
+        channel: The required value of the preview's setting *Display Channel*; 0 is for a preview of all channels.
 
     Returns:
-        The strip. None: there is none, or the preview has another *Display Channel* or shows a scope.
+        The strip that selection.seen finds. None if there is none, or the preview has another *Display Channel* or
+        shows a scope in place of the picture.
     """
     scene, space = selection.scene_of(context), context.space_data
     if (space.display_mode, space.display_channel) != ("IMAGE", channel) or (seen := selection.seen(scene)) is None:
@@ -105,12 +113,14 @@ def look(context: Context, scene: Scene, effect: PropertyGroup, strip: Strip) ->
     """Return how the previews of a scene show an effect's picture.
 
     Args:
-        scene: The scene of the edit.
+        context: The context, whose windows are searched for previews.
+        scene: The scene of the edit, which has the effect strip.
+        effect: The effect.
         strip: The effect strip.
 
     Returns:
-        The scale and the proxy of the largest preview. And whether all previews show the picture as it is, without
-        blending, modifiers or view settings that change it.
+        Scale and proxy of the largest preview, and whether all previews show the picture unchanged: without blending,
+        modifiers, or view settings that alter it.
     """
     areas = list(_areas_of(context, scene))
     scales = {area.spaces.active: _scale(context, scene, strip, area) for area in areas}
@@ -160,10 +170,10 @@ def _scale(context: Context, scene: Scene, strip: Strip, area: Area) -> float:
 
 
 def _pixel(matrix: np.ndarray, size: tuple[int, int]) -> float:
-    """Return the larger side of one pixel of a picture after a transform.
+    """Return the length of the longer side of one pixel of a picture, measured in the space that a matrix maps to.
 
     Args:
-        matrix: (3, 3), from fractions 0 to 1 of the picture.
+        matrix: (3, 3), maps fractions 0 to 1 of the picture's width and height to that space.
         size: The picture's width and height in pixels.
     """
     return float(np.max(np.hypot(*matrix[:2, :2]) / size))

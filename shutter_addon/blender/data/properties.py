@@ -37,11 +37,13 @@ _FAR, _TURN = {"min": -MAX_DISTANCE, "max": MAX_DISTANCE}, math.radians(MAX_DEGR
 
 
 def with_fields(*kinds: type, **more: dict) -> Callable[[type], type]:
-    """Return a class decorator that adds a Blender property for each field of the model's classes.
+    """Return a class decorator that gives a Blender class a property for each field of some dataclasses.
+
+    Each Blender property takes its name, label, range and default from the dataclass's field.
 
     Args:
         kinds: Dataclasses of the model, such as core.model.effect.Shutter.
-        more: By property name, further arguments of the property, such as {"update": …}.
+        more: Further arguments of Blender properties, by property name, such as {"update": callback}.
     """
 
     def added(group: type) -> type:
@@ -53,10 +55,12 @@ def with_fields(*kinds: type, **more: dict) -> Callable[[type], type]:
 
 
 def _property(field: Field, **more: Any) -> object:
-    """Return the Blender property for a field of the model, with its label, range and default.
+    """Return the Blender property for a dataclass field of the model, with its label, range and default.
 
     Args:
-        more: Further arguments of the property, such as `update`.
+        field: Describes the field.
+        more: Further arguments of the Blender property. `update` replaces `changed`, which all but texts have by
+            default.
     """
     kind, default = type(field.default), field.default
     said: dict = {"name": field.label, "description": field.description, "translation_context": field.context}
@@ -78,10 +82,16 @@ def _property(field: Field, **more: Any) -> object:
 
 
 def _region_renamed(region: PropertyGroup, new: str, old: str, is_set: bool) -> str:
-    """Return a region's new name, cut to MAX_NAME characters. Shutters that follow the region get the new name.
+    """Return the name to store for a renamed region: the new name, cut to MAX_NAME characters.
 
-    Blender calls this as the property's `set_transform`. Blender's own `maxlen` would count bytes instead of
-    characters.
+    Shutters that follow the region get the new name, too. Blender calls this as the `set_transform` of the property
+    `name`. Blender's own `maxlen` would count bytes, not characters.
+
+    Args:
+        region: The region.
+        new: The new name.
+        old: The name until now.
+        is_set: Whether the region had a name until now; if not, no shutter follows it.
     """
     new = new[:MAX_NAME]
     if is_set:  # otherwise it has no old name
@@ -90,11 +100,13 @@ def _region_renamed(region: PropertyGroup, new: str, old: str, is_set: bool) -> 
 
 
 def labelled(kind: Callable, name: str, description: str, **more: Any) -> object:
-    """Return a Blender property with a label and a tooltip. By default, a change has pictures made again.
+    """Return a Blender property with a label and a tooltip. When it changes, the effects' frames are made again.
 
     Args:
         kind: A function of bpy.props, such as FloatProperty.
-        more: Further arguments of it.
+        name: The label.
+        description: The tooltip.
+        more: Further arguments of the property. `update` replaces the callback that has the frames made again.
     """
     return kind(name=name, description=description, **({"update": changed} | more))
 
@@ -105,11 +117,15 @@ def choice(name: str, description: str, items: Sequence[tuple[str, str, str]], *
 
 
 def setting(kind: Callable, name: str, description: str, **more: Any) -> object:
-    """Return a property that cannot be keyed and changes no picture. Its label has a translation of this extension.
+    """Return a Blender property that cannot be keyed, and whose change does not alter the effect's pictures.
+
+    The extension translates its label in a context of its own (CONTEXT), apart from Blender's translations.
 
     Args:
         kind: A function of bpy.props, such as FloatProperty.
-        more: Further arguments of it.
+        name: The label.
+        description: The tooltip.
+        more: Further arguments of the property.
     """
     return kind(name=name, description=description, options=set(), translation_context=CONTEXT, **more)
 
@@ -118,9 +134,9 @@ class TrackStop(PropertyGroup):
     """Where and why tracking a region or the camera ended early.
 
     Attributes:
-        frame: Counts from the effect's start, so that it moves with the effect's strips.
+        frame: The frame where it ended, counted from the effect's start, so that it moves with the effect's strips.
         forward: Whether tracking went forward in time.
-        fault: The reason, for the user.
+        fault: The reason, in English, for the user.
     """
 
     frame: FloatProperty(min=-2 * MAX_FRAME, max=2 * MAX_FRAME)
@@ -129,11 +145,11 @@ class TrackStop(PropertyGroup):
 
 
 class DrawnPlace(PropertyGroup):
-    """Where a region was when its drawing at a frame was made: its strokes move along with the region from there.
+    """Where a region was when one of its drawings was made. Its strokes move along with the region from there.
 
     Attributes:
-        frame: Counts from the effect's start, so that it moves with the effect's strips.
-        location: As the region's property of this name, like rotation and scale.
+        frame: The frame of the drawing, counted from the effect's start, so that it moves with the effect's strips.
+        location, rotation, scale: The values of the region's properties of these names when the drawing was made.
     """
 
     frame: FloatProperty()
@@ -143,7 +159,19 @@ class DrawnPlace(PropertyGroup):
 
 
 class _Moving:
-    """The place of a region or the camera over time, with the settings and results of tracking it."""
+    """Place of a region or the camera over time, with the settings and results of tracking it.
+
+    Attributes:
+        location: Movement from the initial place, in fractions of the picture's width and height.
+        rotation: About the center, in radians.
+        scale: About the center; 1 is unchanged.
+        confidence: How certain tracking is of the place at a frame, in percent; keyed by tracking.
+        stops: Where tracking ended early.
+        motion: Which of location, rotation and scale the operators Track and Follow key.
+        track_until: Timeline frame where tracking ends; 0: at the strip's end.
+        track_all_keys: Whether to key each tracked frame, not only those that the motion needs.
+        track_ends: Whether tracking fades out the region, or the camera's influence, where it ends.
+    """
 
     location: labelled(
         FloatVectorProperty, "Location", "Movement, in fractions of the picture", size=2, subtype="XYZ", **_FAR
@@ -237,7 +265,11 @@ class Shutter(PropertyGroup):
 
 @with_fields(model.Effect, Options, window={"update": _window_changed}, position={"update": _window_changed})
 class _Settings:
-    """All of an effect but its shutters and regions. Copies set these first, so that bars fit the window."""
+    """All properties of an effect but its shutters and regions.
+
+    Blender lists the properties of a base class first. So code that copies an effect's properties in order sets the
+    window before the shutters' bars, and changing the window does not resample them.
+    """
 
     name: StringProperty(name="Name", description="Name of the effect", default="Shutter")
     scene: PointerProperty(name="Scene", description="Scene that the effect's strips show", type=bpy.types.Scene)
@@ -268,13 +300,16 @@ class ShutterEffect(_Settings, PropertyGroup):
 
 
 class ShutterScene(PropertyGroup):
-    """What the extension stores on a scene.
+    """What the extension stores on a scene: on the scene of an edit its effects, on an effect scene its identity.
 
-    On a scene with a sequencer: its effects, and the version and data format that saved them (data_format).
+    An effect scene is a scene that the extension adds for an effect. Scene strips show it.
 
     Attributes:
-        identity: Of an effect scene; "": it is none. The effect, its strip and its annotation store it, too, so that
-            the scene is found again. A copied scene gets another one (editing/reconcile.py).
+        effects: The effects of the scene's sequencer.
+        version: The version of the extension that saved them.
+        format: The format of their data (data_format).
+        identity: Identifies an effect scene; "" on other scenes. The effect, its strip and its annotation store it,
+            too, so that they find the scene. A copied scene gets a new identity (editing/reconcile.py).
     """
 
     effects: CollectionProperty(type=ShutterEffect)
@@ -284,12 +319,15 @@ class ShutterScene(PropertyGroup):
 
 
 class ShutterBake(PropertyGroup):
-    """What connects a baked strip with the effect strip that it was made from. Both have it, with the same identity.
+    """Link between a baked strip and the effect strip that it was made from. It is stored on both.
 
     Attributes:
-        version: effect_version.key of the effect when it was baked.
-        first: First of the `count` baked frames, counted from the effect strip's origin.
-        channel: Channel of the effect strip before it made room for the baked strip.
+        identity: The same on both strips; "": the strip has no bake.
+        version: Result of effect_version.key when the effect was baked. If the key differs now, the bake is out of
+            date.
+        first: Number of the first baked frame, counted from the effect strip's origin.
+        count: How many frames were baked.
+        channel: Sequencer channel that the effect strip had before it made room for the baked strip.
     """
 
     identity: StringProperty()

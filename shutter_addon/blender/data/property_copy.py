@@ -11,9 +11,9 @@ POINTED = {"MovieClip": "movieclips", "Image": "images", "Mask": "masks"}
 
 
 def copy_properties(old: PropertyGroup, new: PropertyGroup) -> None:
-    """Copy all stored values of a property group to a new one, including those that only newer versions know.
+    """Copy all stored values of a property group to another, including properties that only newer versions define.
 
-    Pointers still lead to the same data-blocks. No update callback runs.
+    The copy's pointers refer to the same data-blocks. No update callback runs.
     """
     there, copied = old.bl_system_properties_get(do_create=True), new.bl_system_properties_get(do_create=True)
     for name, value in there.items():
@@ -41,10 +41,10 @@ def plain(struct: bpy_struct) -> dict[str, Any]:
 
 @contextmanager
 def for_a_while(changes: Iterable[tuple[object, str, object]]) -> Iterator[None]:
-    """Set attributes within a `with` block, and restore them afterwards.
+    """Set attributes within a `with` block, and restore their old values at its end, even after an exception.
 
     Args:
-        changes: Owner, attribute name and new value of each.
+        changes: For each attribute (object, attribute name, value within the block).
     """
     changes = list(changes)
     before = [(owner, name, getattr(owner, name)) for owner, name, _ in changes]

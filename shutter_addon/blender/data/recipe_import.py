@@ -25,17 +25,17 @@ _KINDS = {model.MatteRegion: "MATTE", model.OutlineRegion: "OUTLINE", model.Subj
 
 
 def apply(scene, effect, strip, source: model.Effect, folder: Path = Path()) -> None:
-    """Replace an effect's data, keys and strokes by those of a recipe.
+    """Replace the settings, regions, strokes and keys of an effect by those of a recipe.
 
     Args:
         scene: The scene that has the effect.
-        effect: Property group of the effect.
-        strip: The effect strip; its first frame is frame 1 of the recipe.
+        effect: The effect's property group.
+        strip: The effect strip. Frame 1 of the recipe is its first frame.
         source: The recipe.
-        folder: Folder of the recipe, to which paths of mattes are relative.
+        folder: The recipe's folder. Paths of mattes in the recipe are relative to it.
 
     Raises:
-        MediaError: A matte is missing. Nothing has changed.
+        MediaError: A matte is missing or cannot be read. The effect is unchanged then.
     """
     first = strip.left_handle - 1
     images = {file: matte_image(folder / file.path, file.channel) for file in recipe.contents(source)}
@@ -58,13 +58,15 @@ def apply(scene, effect, strip, source: model.Effect, folder: Path = Path()) -> 
 
 
 def _set_fields(owner, path: str, part: Any, first: float, **curve) -> None:
-    """Set the properties and keys of a property group from a part of a recipe.
+    """Set properties of a property group, with their keys, to the fields of an object of the model.
 
     Args:
+        owner: The property group.
         path: Data path of `owner` from the scene.
-        part: An object of the model's class that has `owner`'s fields.
-        first: Timeline frame before the effect strip's first; added to the recipe's frames.
-        curve: Further arguments of fcurves.set_keys.
+        part: A part of the recipe, such as a model.Shutter. `owner` has a property for each of its fields.
+        first: Timeline frame before the effect strip's first one. Adding it to a recipe's frame gives the timeline
+            frame.
+        curve: Further arguments of fcurves.set_keys, such as `group`.
     """
     for name, each in fields_of(part.__class__).items():
         value = getattr(part, name)
@@ -75,12 +77,15 @@ def _set_fields(owner, path: str, part: Any, first: float, **curve) -> None:
 
 
 def _set_channel(owner, path: str, name: str, source: Channel, first: float, change: Callable = float, **curve) -> None:
-    """Set a number or a vector of a property group, with keys if the recipe has keys for it.
+    """Set a number or a vector of a property group, with F-curves if the recipe has keys for it.
+
+    Without keys the property gets the constant value; with keys, also the value of the first key.
 
     Args:
         owner, path, first, curve: As in _set_fields.
         name: Name of the property.
-        change: Converts a value of the recipe to Blender's, such as degrees to radians.
+        source: The values over time, from the recipe.
+        change: Converts each value to Blender's, such as degrees to radians.
     """
     if not isinstance(source, keyframes.Keys):
         setattr(owner, name, change(source.at(1)))
@@ -92,22 +97,27 @@ def _set_channel(owner, path: str, name: str, source: Channel, first: float, cha
 
 
 def _set_keys(owner, path: str, index: int, keys: keyframes.Keys, values: Iterable[float], first: float, **curve):
-    """Give one component of a property an F-curve with the frames and eases of `keys`, and with `values`.
+    """Give one component of a property an F-curve that has the frames and eases of `keys`, but other values.
 
     Args:
+        owner: The property group.
         path: Data path of the property from the scene.
-        index: Component of a vector; else 0.
-        first: Added to the frames of `keys`.
+        index: Component of a vector; 0 for a single number.
+        keys: The recipe's keys.
+        values: The value of each key for this component.
+        first: Added to the frames of `keys` to give timeline frames.
+        curve: Further arguments of fcurves.set_keys, such as `group`.
     """
     frames = (frame + first for frame in keys.frames)
     fcurves.set_keys(owner.id_data, path, index, list(zip(frames, values, keys.eases, strict=True)), **curve)
 
 
 def matte_image(path: str | Path, channel: str = "luminance"):
-    """Load a movie, image sequence or picture as the image data-block of a matte, and return that.
+    """Load a movie, image sequence or picture as an image data-block, and return that. It serves a region as matte.
 
     Args:
-        channel: The channel that the matte will use, as recipes name it.
+        path: The file, or the first file of an image sequence.
+        channel: The channel that the matte will use, in the words of recipes. The file must have it.
 
     Raises:
         MediaError: There is no such file, or it lacks the channel.
@@ -188,16 +198,19 @@ def _set_moves(moving, path: str, moves: model.Moves, first: float, **curve) -> 
 
 
 def _draw(effect, strip, source: model.AnyRegion, drawn: model.Drawings, color: Sequence[float], first: float) -> str:
-    """Draw a region's strokes on a new annotation layer, at each frame that the recipe has a drawing for.
+    """Draw a region's strokes on a new annotation layer, and return the layer's name.
+
+    Each drawing goes to its own frame if the region is a subject, or its location has keys. Otherwise it goes to the
+    strip's first frame.
 
     Args:
-        strip: The effect strip, whose transform places the strokes in the sequencer's image.
+        effect: The effect, which has the annotation.
+        strip: The effect strip, by whose transform the strokes are placed in the sequencer's image.
         source: The region in the recipe.
-        drawn: Its strokes to draw, in fractions of the picture.
-        first: Timeline frame before the effect strip's first; added to the recipe's frames.
-
-    Returns:
-        The new layer's name.
+        drawn: The drawings by frame: strokes as points in fractions of the picture.
+        color: The layer's color.
+        first: Timeline frame before the effect strip's first one. Adding it to a recipe's frame gives the timeline
+            frame.
     """
     layer = annotation(effect).layers.new(source.name or data_("Region"), set_active=False)
     layer.color = color

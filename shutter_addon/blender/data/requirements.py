@@ -12,10 +12,11 @@ from .strips import ENGINE, all_strips, own_strips
 
 
 def left_out(scene: Scene) -> list[tuple[range, str]]:
-    """Return where the sequencer would silently leave an effect out of the picture.
+    """Return the effect strips that Blender would leave out of the picture without an error, because of some setting.
 
     Returns:
-        For each effect strip left out, the timeline frames where it lies unmuted, and why, as a sentence for the user.
+        For each such strip: the timeline frames at which it lies and is not muted, and the reason, as a sentence for
+        the user. Strips that are always muted are not listed.
     """
     reasons = ((shown_frames(scene, strip), why) for strip in own_strips(scene) if (why := _why(strip)) is not None)
     return [(frames, why) for frames, why in reasons if frames]
@@ -34,7 +35,9 @@ def _why(strip: Strip) -> str | None:
 
 
 def settings(strip: Strip) -> Iterator[tuple[bpy_struct, str, object]]:
-    """Yield the settings, besides a camera, without which Blender does not render an effect strip's picture.
+    """Yield the settings that an effect strip and its scene need, so that Blender renders the effect's picture.
+
+    It needs a camera as well, which is not among them.
 
     Yields:
         The struct that has the setting, the setting's name, and the value that it needs.
@@ -58,14 +61,17 @@ def camera(strip: Strip) -> Object | None:
 
 
 def shown_scenes(film: Scene, frames: range | None = None) -> dict[Scene, range]:
-    """Return the scenes whose edits a film shows: its own scene, and those in its Scene strips, nested ones too.
+    """Return the scenes whose strips a rendered scene shows: itself, and those of its Scene strips, nested ones too.
+
+    Scenes without a sequencer are left out.
 
     Args:
         film: The scene that is rendered.
-        frames: Timeline frames of it; None: any frame, and muted strips count as well.
+        frames: Timeline frames of `film`. None: all frames, and muted strips count as well.
 
     Returns:
-        For each scene, the frames of it that can be visible: `frames` for the film, all for the others.
+        For each scene, the range of its frames that can be visible. For `film` it is `frames`; if that is None, and for
+        the other scenes, it is all frames that Blender has.
     """
     ever = range(-MAX_FRAME, MAX_FRAME + 1)
     shown = {film: ever if frames is None else frames}
@@ -98,10 +104,14 @@ def shown_frames(scene: Scene, strip: Strip) -> range:
 
 
 def used_data(scene: Scene, frames: range) -> set[ID]:
-    """Return the data-blocks that pictures at these timeline frames use: images, clips, fonts, scenes and so on.
+    """Return the data-blocks that pictures at these timeline frames depend on: images, clips, fonts, scenes and so on.
 
-    These are what the shown strips use, directly or through other data. What scenes hold beside their strips is in no
-    picture.
+    These are what visible strips and their modifiers use, directly or through other data-blocks. What a scene has
+    beside its strips does not count unless a strip renders it.
+
+    Args:
+        scene: The scene that is rendered.
+        frames: Its timeline frames.
     """
     shown = shown_scenes(scene, frames)
     uses: dict = {}

@@ -36,11 +36,13 @@ def tried(function: Callable, *arguments: object) -> Any:
 
 
 def value(owner: PropertyGroup, field: Field, number: float | None = None) -> Any:
-    """Return the value of a property as the model has it: words in place of enum items, for example.
+    """Return the value of a Blender property as the model's field has it, such as a word for an enum item.
 
     Args:
-        field: The model's field for the property, of a kind whose value is no channel.
-        number: What the property's F-curve says, in place of the property's own value.
+        owner: The struct that has the property.
+        field: The model's field. It must not be one whose value is a channel.
+        number: The value of the property's F-curve, to be used in place of the stored value. Only choices and switches
+            (at least 0.5 is True) use it. None: there is none.
 
     Raises:
         EffectError: The value is none of its choices, or out of range.
@@ -63,13 +65,15 @@ def placement_now(moving: PropertyGroup) -> Placement:
 
 @dataclass(frozen=True)
 class Sampling:
-    """Reads an effect's properties as channels: constants or, with F-curves, their values at some timeline frames.
+    """Reads an effect's properties as channels.
+
+    A property without F-curves becomes a constant. One with F-curves is read at each frame of `frames`.
 
     Attributes:
         curves: The F-curves of the scene that has the effect.
         effect: The effect's property group.
-        strip: The effect strip; None: nothing that is read depends on where it lies.
-        frames: Timeline frames at which properties with F-curves are sampled.
+        strip: The effect strip; None: nothing that is read depends on it; `placement` is then None at all frames.
+        frames: Timeline frames at which properties with F-curves are read.
     """
 
     curves: Curves
@@ -87,42 +91,44 @@ class Sampling:
         return self.effect.path_from_id()
 
     def over(self, keyed: object, at: Callable[[float], object], keys: tuple = ()) -> Channel:
-        """Return `at(frame)` as a channel (values over time): sampled at all frames if it is keyed, else constant.
+        """Return the results of `at(frame)` as a channel: evaluated at all frames if it is keyed, else once.
 
-        A UserError at one frame is kept, and raised when that frame's value is asked for.
+        A UserError that `at` raises for one frame is stored and raised when that frame's value is asked for.
 
         Args:
-            keyed: The F-curves that `at` evaluates, or any true value if it depends on the frame.
-            at: Takes a timeline frame.
-            keys: Frames and eases of the F-curves' keys, as in keyframes.Samples.
+            keyed: F-curves that `at` evaluates, or anything else that is true if its result depends on the frame.
+            at: Returns the value at a timeline frame.
+            keys: Frames and eases of the F-curves' keys, as Curves.keys returns them; for keyframes.Samples.
         """
         if not keyed:
             return keyframes.Constant(tried(at, 0.0))
         return keyframes.Samples({frame: tried(at, frame) for frame in self.frames}, keys)
 
     def channel(self, owner: PropertyGroup, path: str, name: str, change: Callable = lambda value: value) -> Channel:
-        """Return the values over time (a channel) of a float property or vector.
+        """Return the values of a float property or vector over time, as a channel.
+
+        A value out of the property's range is an EffectError, which the channel raises when that value is asked for.
 
         Args:
             owner: The struct that has the property.
             path: Data path of `owner` from the scene.
             name: Name of the property.
-            change: Applied to each value, such as from radians to degrees.
+            change: Applied to each value, for example to convert radians to degrees.
         """
         curves, keyed = self.curves, self.curves.of(owner, path, name)
         return self.over(keyed, lambda frame: change(curves.value(owner, path, name, frame)), curves.keys(keyed))
 
     def fields(self, owner: PropertyGroup, path: str, kind: type, unused: Collection[str] = ()) -> dict:
-        """Return arguments for a class of the model, read from a property group: values and channels by field name.
+        """Read a property group as keyword arguments for a class of the model: a value or a channel for each field.
 
         Args:
             owner: The property group.
             path: Data path of `owner` from the scene.
             kind: The class, such as model.Shutter.
-            unused: Fields that have no effect now and are left out, so that they keep their defaults.
+            unused: Names of fields to leave out, because they have no effect now. The class's defaults then apply.
 
         Raises:
-            EffectError: A choice is none of its items, or a number without keys is out of range.
+            EffectError: An enum property has an unknown item, or a number that is no channel is out of range.
         """
         return {
             name: self.channel(owner, path, field.blender) if field.is_channel else value(owner, field)
@@ -131,9 +137,10 @@ class Sampling:
         }
 
     def moves(self, moving: PropertyGroup, path: str) -> model.Moves:
-        """Return the motion of a region or the camera: location, rotation in degrees, and scale over time.
+        """Return the motion of a region or the camera as channels: location, rotation (in degrees) and scale.
 
         Args:
+            moving: The region or the camera.
             path: Data path of `moving` from the scene.
         """
         return model.Moves(
@@ -144,9 +151,10 @@ class Sampling:
 
     @cached_property
     def placement(self) -> Channel:
-        """Over time, the matrix (3, 3) from the sequencer's image space to fractions of the effect strip's picture.
+        """Channel of the matrix (3, 3) from the sequencer's image space to fractions of the effect strip's picture.
 
-        Its value is None where the strip is too small to be seen. Without a strip it is None at all frames.
+        A value is None at frames where the strip is so small that a side has fewer than 4 pixels, and at all frames if
+        there is no strip.
         """
         strip = self.strip
         if strip is None:
@@ -162,9 +170,10 @@ class Sampling:
 
     @cached_property
     def time(self) -> Channel | None:
-        """Over time, the source frame that *Custom Time* shows, and whether it runs backward; None: it is off.
+        """Channel of what *Custom Time* shows: (source frame, whether time runs backward). None: *Custom Time* is off.
 
-        For shutters whose length is *Timeline*, it is sampled half a frame before and after each frame as well.
+        Source frame 1 is the source's first. If the exposure length of a shutter is *Timeline*, the channel has values
+        half a frame before and after each sampled frame, too.
         """
         effect = self.effect
         if not effect.use_source_time:

@@ -214,13 +214,15 @@ def _widths(spline: MaskSpline, weights: np.ndarray, segment: np.ndarray, u: np.
 
 
 def _pixel_wide(edge: np.ndarray, feather: np.ndarray, pixel: float) -> np.ndarray:
-    """Move points of the feather's outer edge that are too near to the spline's polygon.
+    """Return the feather's outer edge (n, 2) with a distance of at least a pixel from the spline's polygon.
+
+    A point that is nearer is replaced by the polygon's point with the same index, moved by `pixel` to the feather's
+    side. Its direction is the normal at the previous point of the polygon, as in Blender.
 
     Args:
-        edge: The spline's polygon (n, 2).
-        feather: The feather's outer edge (n, 2).
-        pixel: The least distance, in fractions of the picture. Points move along the previous point's normal, as in
-            Blender.
+        edge: The spline's polygon (n, 2), in fractions of the picture.
+        feather: The feather's outer edge (n, 2), a point for each point of `edge`.
+        pixel: The least distance, in fractions of the picture.
     """
     steps = _normalized(np.roll(edge, 1, axis=0) - edge)
     along = _normalized(np.roll(steps, 1, axis=0) + steps)
@@ -239,14 +241,15 @@ def _normalized(vectors: np.ndarray) -> np.ndarray:
 
 
 def _fill(value: np.ndarray, polygons: list[np.ndarray], solver: str, holes: bool) -> None:
-    """Set the pixels of `value` (h, w) inside polygons (n, 2) to 1.
+    """Set the pixels of `value` whose middles are inside polygons to 1, in place. Other pixels stay.
 
     Args:
-        value: The pixels.
-        polygons: In fractions of the picture.
-        solver: How polygons are combined if there are holes, as MaskLayer.fill_solver: "CDT" sums their windings,
-            "SWEEP_LINE" is even-odd.
-        holes: Whether polygons inside others make holes. Otherwise each polygon is filled by itself.
+        value: The pixels (h, w), the picture's lowest row first.
+        polygons: (n, 2) each, in fractions of the picture, y up.
+        solver: Used only if `holes` is true. "CDT": a place is inside if the polygons' windings around it do not add up
+            to 0. "SWEEP_LINE": it is inside if an odd number of them goes around it (even-odd).
+        holes: Whether the polygons are filled together, so that one inside another can make a hole. Otherwise each is
+            filled alone, and they add up.
     """
     in_pixels = [polygon * value.shape[::-1] for polygon in polygons]
     for group in [in_pixels] if holes else [[polygon] for polygon in in_pixels]:
@@ -254,13 +257,16 @@ def _fill(value: np.ndarray, polygons: list[np.ndarray], solver: str, holes: boo
 
 
 def feather(value: np.ndarray, quads: np.ndarray, falloff: Callable[[np.ndarray], np.ndarray]) -> None:
-    """Raise the pixels of `value` (h, w) that quads cover to the quads' values.
+    """Draw feathers: raise the pixels of `value` that are inside quads, in place.
+
+    A pixel gets the quad's value at its middle if that is higher than its own. The value is 1 between the first two
+    corners of a quad, 0 between the last two, and interpolated by mean value coordinates elsewhere.
 
     Args:
-        value: The pixels, with values 0 to 1.
-        quads: Corners (n, 4, 2) in fractions of the picture. The value is 1 at the first two corners and 0 at the last
-            two, and interpolated in between by mean value coordinates.
-        falloff: Converts interpolated values (0 to 1) to those of the pixels.
+        value: The pixels (h, w), 0 to 1, the picture's lowest row first.
+        quads: Corners (n, 4, 2) in fractions of the picture, y up, in order around the quad: two on the spline, two on
+            the feather's outer edge.
+        falloff: Converts the interpolated values, 0 to 1, to the values of pixels (see _FALLOFFS).
     """
     height, width = value.shape
     flat = value.reshape(-1)
@@ -280,13 +286,18 @@ def feather(value: np.ndarray, quads: np.ndarray, falloff: Callable[[np.ndarray]
 
 
 def _quad_rows(quads: np.ndarray, width: int, height: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return the pixels that quads (n, 4, 2) cover, as spans of rows.
+    """Return the pixels that quads cover, as m spans: runs of pixels in a row.
 
-    A quad is divided into triangles between its first and third corner, as in Blender. That matters for quads that are
-    not convex.
+    A quad that is not convex is divided into triangles between its first and third corner, as in Blender. So a quad can
+    have more than one span in a row.
+
+    Args:
+        quads: Corners (n, 4, 2) in fractions of the picture, y up.
+        width, height: Of the picture, in pixels.
 
     Returns:
-        For each span the quad's index, the row, the first pixel and one past the last, (m,) each.
+        Four arrays (m,): for each span the quad's index, the row from the bottom, the first pixel, and one past the
+        last pixel.
     """
     sides = np.roll(quads, -1, axis=1) - quads
     following = np.roll(sides, -1, axis=1)
@@ -311,10 +322,12 @@ def _quad_rows(quads: np.ndarray, width: int, height: int) -> tuple[np.ndarray, 
 
 
 def _nearness(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return how near points are to the first two corners of quads, 0 to 1 (n,), by mean value coordinates.
+    """Return how near points are to the first two corners of their quads: (n,), from 0 (at the last two) to 1.
+
+    This is the sum of the mean value coordinates of the first two corners; 0.5 where these are undefined.
 
     Args:
-        x, y: (4, n), the distances along each axis from the points to the four corners of their quads.
+        x, y: (4, n), for each of a quad's four corners the vector's x or y from the point to the corner.
     """
     lengths = np.sqrt(x * x + y * y)
     tangents = []

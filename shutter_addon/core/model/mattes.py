@@ -29,14 +29,16 @@ _SMALLEST = 1e-6
 
 @dataclass(frozen=True)
 class FileFrame:
-    """The frame of a matte file that a matte shows.
+    """Which frame of a matte file a matte shows, by one of three rules.
 
     Attributes:
-        file: The file.
-        offset: The number of frames that the matte plays ahead of the footage (or of `time`).
-        time: Timeline frames since the one that shows the file's frame `offset`. None: the matte follows the footage,
-            and shows the frame with the number of the footage's filmed frame plus `offset`.
-        timing: The timing of a strip that shows the file; `time` is then a timeline frame.
+        file: The matte file.
+        offset: A number of the file's frames, which is added as below.
+        time: None: the matte shows the file's frame n + `offset`, where n is the footage's filmed frame that is shown.
+            Otherwise, without `timing`: the timeline frames since the start of the file's frame `offset`; the file
+            shows frame ⌊`time`⌋ + `offset`.
+        timing: The timing of a strip that plays the file. `time` is then the timeline frame, and `offset` is not used.
+            None: no strip plays it.
     """
 
     file: SourceFile
@@ -45,11 +47,11 @@ class FileFrame:
     timing: StripTiming | None = None
 
     def index(self, source: FrameSource, shown: int) -> int:
-        """Return the index of the frame in the opened file; it may be out of range.
+        """Return the number, from 0, of the file's frame to show. It can be below 0 or beyond the file's last frame.
 
         Args:
-            source: The opened file.
-            shown: The filmed frame of the footage that is shown, from 0.
+            source: The opened file; only needed for its length and rate if there is a `timing`.
+            shown: The footage's filmed frame that is shown, from 0; only used if `time` is None.
         """
         if self.time is None:
             return shown + self.offset
@@ -60,14 +62,15 @@ class FileFrame:
 
 @dataclass(frozen=True)
 class FileFrames:
-    """A channel of the frames of a matte file. By default they follow those of the footage, `offset` frames ahead.
+    """A channel that gives the frame of a matte file (FileFrame) to show at each timeline frame.
 
     Attributes:
-        file: The file.
-        offset: The number of frames that the matte plays ahead.
-        first: The timeline frame that shows the file's frame `offset`; the file then plays along the timeline. None: it
-            follows the footage.
-        timing: The timing of a strip that shows the file. `offset` and `first` then do not count.
+        file: The matte file.
+        offset: Frames by which the file plays ahead of the footage, or of the timeline if there is a `first`.
+        first: The timeline frame that shows the file's frame `offset`; the file then plays one frame per timeline
+            frame. None: the file plays with the footage, frame n + `offset` at the footage's filmed frame n.
+        timing: The timing of a strip that plays the file; `offset` and `first` are then not used. None: no strip plays
+            it.
     """
 
     file: SourceFile
@@ -86,12 +89,14 @@ class FileFrames:
 class Ramp:
     """A gradient of values from 0 to 1 across the picture.
 
-    A linear ramp goes from left to right; at any rotation, the outermost corners are 0 and 1. A radial one goes from
-    the centre to the farthest corner. An angle goes once around the centre, clockwise from the top.
+    A linear ramp rises from left to right; its start and end lie at the picture's outermost corners, at any rotation. A
+    radial one rises from the centre to 1 at the corners. An angle ramp rises clockwise from the top, once around the
+    centre, and jumps from 1 to 0 there. All this is before `placed` moves and scales the ramp.
 
     Attributes:
-        kind: Its shape.
-        placed: Where it lies, turned and scaled about the picture's centre.
+        kind: The ramp's shape: "linear", "radial" or "angle".
+        placed: Where the ramp lies: shifted, turned and scaled about the picture's centre. Scale does not change an
+            angle ramp. A negative scale adds half a turn to any ramp.
     """
 
     kind: RampKind
@@ -116,7 +121,13 @@ class Ramp:
 
 @dataclass(frozen=True)
 class Outline:
-    """A matte that is 1 inside closed curves and 0 outside (core/model/outlines.py)."""
+    """A matte that is 1 inside closed curves and 0 outside, and in between where a curve crosses a pixel.
+
+    A place inside two overlapping curves is outside (see outlines.coverage).
+
+    Attributes:
+        curves: The curves, points in fractions of the picture, y up.
+    """
 
     curves: Curves
 
@@ -130,14 +141,15 @@ Content = FileFrame | Ramp | Outline | MaskShape
 
 @dataclass(frozen=True)
 class Matte:
-    """A matte at one frame.
+    """A matte at one frame: how much of a shutter each pixel gets.
 
     Attributes:
-        shutter: The index of the shutter that pixels get in proportion to the matte's values.
-        content: What gives the values.
-        blend: "over" leaves the rest to the regions beneath. "add" takes only from the default shutter, so that mattes
-            that add up to 1 can be side by side.
-        opacity: 0 to 1, a factor after inversion.
+        shutter: The index of the shutter.
+        content: What gives a value 0 to 1 for each pixel: a file's frame, a ramp, an outline or a mask.
+        blend: With v the value after inversion and opacity, "over": a pixel gets the share v of the shutter, and all
+            its other shutters are reduced by the factor 1 − v. "add": the share v is taken from the default shutter
+            only, at most what is left of that, so that mattes which add up to 1 can lie side by side.
+        opacity: 0 to 1, a factor for the values, after inversion.
         feather: The width to which hard edges are blurred, as a fraction of the picture's height.
         invert: Whether each value v becomes 1 − v.
     """
@@ -154,15 +166,17 @@ class MatteReader(Protocol):
     """Reads the values of mattes for pictures of one size. It keeps files open, and the last values in memory."""
 
     def values(self, mattes: tuple[Matte, ...], index: int, block: int) -> list[tuple[Hashable, np.ndarray]]:
-        """Return the values of mattes in the shown frame, each with a key that is equal for equal values.
+        """Return the values of mattes at a shown frame, each with a key for caching: equal keys mean equal values.
 
         Args:
             mattes: The mattes.
-            index: The shown source frame.
-            block: The side of the blocks of pixels that share a value.
+            index: The footage's frame that is shown, from 0, counting moments (frames made between two filmed ones).
+                Matte files have filmed frames only; the file's nearest frame is used beyond its ends.
+            block: The values are means over blocks of `block` × `block` pixels; 1: one value per pixel.
 
         Returns:
-            (key, values) for each matte: (h, w) float32, 0 to 1, without the opacity.
+            (key, values) for each matte: values (rows, columns of blocks) float32, 0 to 1, feathered and inverted, but
+            without the opacity.
 
         Raises:
             UserError: A file cannot be read.
@@ -176,13 +190,14 @@ class MatteReader(Protocol):
 
 
 def blended(coefficients: np.ndarray, mattes: tuple[Matte, ...], values: Sequence[np.ndarray]) -> np.ndarray:
-    """Return coefficients (N, h, w) with mattes laid over them, one after another.
+    """Return coefficients (N, h, w) with mattes laid over them, one after another. A pixel's sum stays 1.
 
-    A matte with value m gives the shutter e its share: c ← (1 − m) c + m e. The sum of a pixel's coefficients stays 1.
+    With share s = a matte's value · its opacity, "over" makes each coefficient c of a pixel c (1 − s), and then adds s
+    to the matte's shutter. "add" moves s, at most coefficient 0, from shutter 0 to the matte's shutter.
 
     Args:
-        coefficients: (N, h, w), or (N, 1, 1) if they are the same everywhere.
-        mattes: The mattes, the lowest first.
+        coefficients: How much of each of N shutters a pixel gets: (N, h, w), or (N, 1, 1) if it is the same everywhere.
+        mattes: The mattes, at least one, the lowest first.
         values: (h, w) of each matte, 0 to 1, without its opacity.
     """
     result = np.array(np.broadcast_to(coefficients, (len(coefficients), *np.shape(values[0]))))

@@ -44,9 +44,14 @@ Placements = Mapping[int, Placement]  # by frame
 
 @dataclass(frozen=True)
 class Similarity:
-    """A motion of the picture that turns, scales and shifts it: a point z goes to turn · z + shift.
+    """A motion of the picture that turns, scales and shifts it: a point z moves to turn · z + shift.
 
-    z = x + iy in pixels, y down. Whole numbers are the middles of pixels.
+    Points are complex numbers z = x + iy in pixels, y down. Whole numbers are the middles of pixels.
+
+    Attributes:
+        turn: Rotation and scale: the angle of this number is the rotation (clockwise in the picture, as y is down), its
+            absolute value the scale.
+        shift: The shift in pixels, dx + i·dy.
     """
 
     turn: complex = 1 + 0j
@@ -104,13 +109,14 @@ def fractions(pixel: complex, size: Size) -> tuple[float, float]:
 
 
 def carried(placement: Placement, motion: Similarity, before: np.ndarray, after: np.ndarray, size: Size) -> Placement:
-    """Return the placement with which a region goes along with a motion of the picture, such as a tracked one.
+    """Return a region's placement after a motion of the picture (such as a tracked one) with which it moves.
 
     Args:
         placement: The region's placement at the motion's start.
-        motion: The motion.
-        before, after: Centres (2,) of the drawn, unplaced shape at the motion's start and end, in fractions.
-        size: Of the picture in which the motion is measured.
+        motion: The motion of the picture from its start to its end.
+        before, after: Centres (2,) of what is drawn of the region, before any placement, at the motion's start and end,
+            in fractions of the picture. They differ if the drawing changes.
+        size: Width and height of the picture, in pixels, in which the motion is measured.
     """
     x, y = fractions(motion(pixel(np.add(before, placement.location), size)), size)
     location = x - float(after[0]), y - float(after[1])
@@ -121,12 +127,13 @@ def carried(placement: Placement, motion: Similarity, before: np.ndarray, after:
 def motion_between(
     first: Placement, second: Placement, before: np.ndarray, after: np.ndarray, size: Size
 ) -> Similarity:
-    """Return the motion of the picture that takes a shape from one placement to another; the inverse of `carried`.
+    """Return the motion of the picture that takes a shape from one placement to another, as `carried` does in reverse.
 
     Args:
-        first, second: The placements.
-        before, after: Centres (2,) of the drawn, unplaced shape at the two placements, in fractions of the picture.
-        size: Of the picture.
+        first, second: The shape's placements at the motion's start and end.
+        before, after: Centres (2,) of what is drawn, before any placement, at the motion's start and end, in fractions
+            of the picture.
+        size: Width and height of the picture, in pixels.
     """
     angle = math.radians(first.rotation - second.rotation)
     turn = cmath.rect(second.scale / first.scale, angle)
@@ -163,17 +170,18 @@ def averaged(placements: Sequence[Placement], weights: np.ndarray) -> Placement:
 def thinned(
     placements: Placements, points: np.ndarray, size: Size, kept: Collection[float] = (), tolerance: float = 1.0
 ) -> list[int]:
-    """Return the frames, ascending, at which keys suffice to describe a motion of a shape.
+    """Return the frames, ascending, at which a shape's motion needs keys, so that it has as few as needed.
 
-    With linear eases between these keys, no point of the shape is off by more than the tolerance. A span that is off is
-    split at its worst frame (Ramer, Douglas, Peucker).
+    Placements are interpolated linearly between keys. No point of the shape then is off by more than the tolerance. A
+    span that is too far off gets a key at its worst frame (Ramer, Douglas, Peucker). The first and last frame always
+    are keys.
 
     Args:
         placements: The shape's placement at each frame.
-        points: (n, 2) of the shape, from `offsets`.
-        size: Of the picture in whose pixels the tolerance is measured.
-        kept: Frames that always keep their keys.
-        tolerance: In pixels.
+        points: Points (n, 2) of the shape relative to its centre, in fractions of the picture, from `offsets`.
+        size: Width and height of the picture, in pixels.
+        kept: Frames that must be keys; those without a placement do not count.
+        tolerance: The largest error, in pixels.
     """
     frames = sorted(placements)
     if len(frames) < 3:
@@ -210,16 +218,16 @@ def _placement(numbers: np.ndarray) -> Placement:
 
 
 def _distances(frames: np.ndarray, numbers: np.ndarray, points: np.ndarray, size: Size) -> np.ndarray:
-    """Return the error of a shape's motion at each frame if it had keys only at the first and last frame.
+    """Return the error at each frame if a shape's placements are interpolated from the first and last one.
 
     Args:
-        frames: (f,).
-        numbers: Placements (f, 4), as from `as_array`.
-        points: Of the shape, x + iy in pixels relative to its centre.
-        size: Of the picture.
+        frames: The frames (f,), ascending, at least 2.
+        numbers: The true placements (f, 4) at these frames, as from `as_array`.
+        points: The shape's points, complex numbers x + iy in pixels relative to its centre.
+        size: Width and height of the picture, in pixels.
 
     Returns:
-        The largest distance of any point at each frame, (f,) in pixels.
+        The distance, in pixels, between the true and the interpolated place of the point that is farthest off: (f,).
     """
     share = ((frames - frames[0]) / (frames[-1] - frames[0]))[:, None]
     straight = (1 - share) * numbers[0] + share * numbers[-1]

@@ -59,10 +59,12 @@ def _covered(strokes: Sequence, width: int, height: int, band: range) -> np.ndar
 
 
 def nearest(shapes: Curves, point: tuple[float, float], aspect: float) -> tuple[int, float]:
-    """Return the index of the curve that is nearest to a point, and its distance in heights of the picture.
+    """Return the index of the curve that is nearest to a point, and the distance to it in heights of the picture.
+
+    Distances are accurate to _NEAR.
 
     Args:
-        shapes: The curves.
+        shapes: The closed curves.
         point: In fractions of the picture, y up.
         aspect: The picture's width / height.
 
@@ -77,16 +79,18 @@ def nearest(shapes: Curves, point: tuple[float, float], aspect: float) -> tuple[
 def dragged(
     shapes: Curves, index: int, grabbed: tuple[float, float], by: tuple[float, float], reach: float, aspect: float
 ) -> Curves:
-    """Return curves after one of them has been pulled by hand.
+    """Return the curves after one of them has been pulled by hand.
 
-    The curve's place that is nearest to `grabbed` moves `by` as much. Other places move less, the farther along the
-    curve they are from it, and from `reach` on not at all.
+    The point of the curve that is nearest to `grabbed` moves by the vector `by`. Points farther along the curve move
+    less, and from the distance `reach` on not at all. The pulled part of the curve gets more points; the other curves
+    stay.
 
     Args:
-        shapes: The curves.
-        index: Which of them is pulled.
-        grabbed, by: Fractions of the picture, y up.
-        reach: Heights of the picture, along the curve.
+        shapes: The closed curves.
+        index: The index of the pulled curve.
+        grabbed: The place that was grabbed, in fractions of the picture, y up.
+        by: The movement, in fractions of the picture, y up.
+        reach: How far the pull acts, along the curve in both directions, in heights of the picture.
         aspect: The picture's width / height.
     """
     points, own = _finer(shapes[index], aspect, reach / 12)  # at least 12 points on either side are pulled
@@ -101,15 +105,15 @@ def dragged(
 
 
 def _finer(shape: Sequence, aspect: float, most: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return a closed curve with more points.
+    """Add points to a closed curve until neighbours are close to each other. Its shape stays.
 
     Args:
         shape: The curve, (n, 2) in fractions of the picture.
         aspect: The picture's width / height.
-        most: The largest distance between two points in heights of the picture.
+        most: The largest distance between two neighbouring points, in heights of the picture.
 
     Returns:
-        Points (m, 2), and which of them (m,) are the curve's own.
+        All points (m, 2) in the curve's order, and a mask (m,) bool that is true for the curve's original points.
     """
     points = np.asarray(shape, dtype=np.float64)
     ends = np.roll(points, -1, axis=0)
@@ -125,14 +129,15 @@ def _apart(points: np.ndarray, point: tuple[float, float], aspect: float) -> np.
 
 
 def in_order(drawings: Iterable[Curves], aspect: float) -> list[Curves]:
-    """Reorder the curves and points of drawings, so that similar curves of successive drawings can be interpolated.
+    """Return drawings with curves and points reordered, so that curves can be interpolated between drawings.
 
-    Strokes are paired by their position in a drawing (scribbles.between_strokes), and their points by theirs. Similar
-    curves get the same position where possible. All curves get _POINTS points, counter-clockwise, from similar places
-    on.
+    Interpolation pairs curves by their index in two drawings, and points by their index in the curve
+    (scribbles.between_strokes). So a curve and the curve in the next drawing that resembles it (place and size) get the
+    same index, as far as possible; curves that are present for longest come first. Each gets _POINTS points,
+    counter-clockwise, beginning at a similar place. Curves of fewer than 3 points are dropped.
 
     Args:
-        drawings: Curves in fractions of the picture, drawing after drawing.
+        drawings: The curves of each drawing, in fractions of the picture, in order of time.
         aspect: The picture's width / height.
     """
     chains: list[dict[int, np.ndarray]] = []  # a curve by the numbers of its drawings

@@ -18,12 +18,13 @@ FADE = 5
 
 
 class Stop(NamedTuple):
-    """Where a track ends.
+    """Where tracking a subject stopped.
 
     Attributes:
-        frame: The first frame without the track, in the direction of tracking.
-        is_forward: Whether that direction is forward.
-        is_cut: Whether the shot ends there.
+        frame: The first frame that tracking did not reach: after the last tracked one if it went forward, before if
+            backward.
+        is_forward: Whether tracking went forward in time.
+        is_cut: Whether it stopped because the shot ends there.
     """
 
     frame: int
@@ -32,12 +33,12 @@ class Stop(NamedTuple):
 
 
 class Key(NamedTuple):
-    """A key that fades a region in or out.
+    """A key of the factor that fades a region's opacity, or the camera's influence, out and in.
 
     Attributes:
         frame: The frame.
-        value: 0 or 1, a factor for the opacity.
-        ease: The ease until the next key, as in recipes.
+        value: 0 (faded out) or 1 (in full).
+        ease: How the value changes from this key to the next one: "linear" or "constant" (it jumps at the next key).
     """
 
     frame: int
@@ -46,11 +47,12 @@ class Key(NamedTuple):
 
 
 class Gap(NamedTuple):
-    """Frames without the subject.
+    """A span of frames in which the subject was not found.
 
     Attributes:
-        first, last: The first and the last of these frames, or −∞ and ∞.
-        hard_first, hard_last: Whether the first, or the last, frame is at a cut, where nothing fades.
+        first, last: The first and the last frame of the span; −∞ or ∞ if it has no end on that side.
+        hard_first: Whether the span begins at a cut, so that the region disappears at once instead of fading.
+        hard_last: Whether the span ends at a cut, so that the region appears at once.
     """
 
     first: float
@@ -62,15 +64,19 @@ class Gap(NamedTuple):
 def keys(
     seen: Collection[int], stops: Iterable[Stop], kept: Collection[int], fade: int = FADE, beside: int = 0
 ) -> list[Key]:
-    """Return keys, ascending, that fade a region out before each gap of its track and in again after it.
+    """Return keys, ascending by frame, of a factor that is 0 in the gaps of a track and 1 elsewhere, with fades.
+
+    The value fades to 0 before each gap and back to 1 after it. An end without limit (see Gap) has no fade.
 
     Args:
-        seen: Frames where the subject was found. A gap lasts from a stop to the next of these frames. If a stop is at
-            such a frame, because another track has found the subject there, the gap is only that frame.
-        stops: Where tracks end. Without any, there are no keys.
-        kept: Frames that keep the value 1, even next to a gap.
-        fade: Frames of a fade. It is shorter between gaps that are close, and a jump at cuts.
-        beside: Frames on each side of a gap that have the value 0 as well.
+        seen: Frames in which the subject was found. A gap lasts from a stop to the nearest such frame in the direction
+            of tracking. If the stop itself is one, since another track found the subject there, the gap is that frame
+            only.
+        stops: Where tracking stopped. Without any, there are no gaps and no keys.
+        kept: Frames outside the gaps that have the value 1. They shorten fades that would reach beyond them.
+        fade: The length of a fade, in frames. Between two gaps it is at most half their distance. At a cut there is a
+            jump.
+        beside: Frames on each side of a gap that are part of it, too.
     """
     changes: list[Key] = []
     before = -math.inf
@@ -94,9 +100,12 @@ def keys(
 
 
 def gaps(seen: Collection[int], stops: Iterable[Stop], beside: int = 0) -> list[Gap]:
-    """Return the spans of frames without the subject (gaps), ascending, with adjoining ones merged.
+    """Return the spans in which the subject was not found, ascending. Spans that touch or overlap are merged.
 
-    Arguments as for `keys`.
+    Args:
+        seen: As for `keys`.
+        stops: As for `keys`.
+        beside: Frames by which a span is longer on each side.
     """
     merged: list[Gap] = []
     for each in sorted(_gap(seen, stop) for stop in stops):
@@ -110,10 +119,13 @@ def gaps(seen: Collection[int], stops: Iterable[Stop], beside: int = 0) -> list[
 
 
 def _gap(seen: Collection[int], stop: Stop) -> Gap:
-    """Return the frames without the subject that begin where tracking stopped, or end there if it went backward.
+    """Return the span without the subject at a stop: from there on if tracking went forward, up to there if backward.
+
+    It ends at the nearest frame of `seen` in that direction, or has no end (∞ or −∞). If the stop is at a frame of
+    `seen`, the span is that frame only.
 
     Args:
-        seen: Frames where the subject was found. They bound the gap; if tracking stopped at one, the gap is that frame.
+        seen: Frames in which the subject was found.
         stop: Where tracking stopped.
     """
     frame = stop.frame

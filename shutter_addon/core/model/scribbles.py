@@ -30,11 +30,11 @@ class Shape:
     """A region of strokes at one frame.
 
     Attributes:
-        shutter: The index of its shutter.
-        kind: "line": the shutter is for what the strokes cover; "lasso": for what they enclose.
-        width: Of lines.
-        strokes: Points (n, 2) of each stroke.
-        opacity: 0 to 1.
+        shutter: The index of the shutter that the region's pixels get.
+        kind: "line": those that the strokes cover; "lasso": those that the strokes enclose.
+        width: Of the lines, as a fraction of the picture's height; not used for a lasso.
+        strokes: The points (n, 2) of each stroke, in fractions of the picture, y up.
+        opacity: 0 to 1, how strongly the region acts.
     """
 
     shutter: int
@@ -45,14 +45,14 @@ class Shape:
 
 
 def layers(shapes: Collection[Shape]) -> list[tuple[float, tuple[Shape, ...]]]:
-    """Replace shapes that have opacities by sets of opaque shapes, each set with a share of the result.
+    """Split shapes into sets in which all shapes are opaque. Their weighted mean acts like shapes with opacities.
 
-    How much of each shutter a pixel gets is the mean of what the sets give. So a shape with an opacity of one half
-    has half of its effect.
+    The caller rasterises each set, and averages how much of each shutter a pixel gets, with the sets' weights. So a
+    shape with an opacity of one half has half of its effect. A set has all shapes whose opacity is above a limit, and
+    the limit rises from set to set.
 
     Returns:
-        (share, shapes) for each set. The shares are the weights of the mean, and sum to 1. The first set has all shapes
-        with an opacity above 0.
+        (weight, shapes) for each set. The weights add up to 1. The first set has all shapes with an opacity above 0.
     """
     steps = sorted({0.0, 1.0, *(shape.opacity for shape in shapes)})
     return [(high - low, tuple(s for s in shapes if s.opacity >= high)) for low, high in pairwise(steps)]
@@ -78,15 +78,16 @@ def resample(stroke: ArrayLike, count: int, aspect: float = 1.0) -> np.ndarray:
 def between_strokes(
     first: Sequence[ArrayLike], second: Sequence[ArrayLike], u: float, aspect: float = 1.0
 ) -> list[np.ndarray]:
-    """Return strokes between those of two drawings, paired in order.
+    """Interpolate the strokes of two drawings. Strokes are paired by their index in the drawings.
 
-    Strokes with equal numbers of points move point by point, others by distance along the stroke. A stroke of the first
-    drawing without a partner stays; one of the second appears at u = 1.
+    A pair with equal numbers of points moves point by point. Otherwise both strokes get the larger number of points at
+    equal distances first. A stroke without a partner stays as it is if it is in the first drawing, and appears at u = 1
+    if it is in the second.
 
     Args:
-        first, second: The strokes (n, 2) of the drawings.
-        u: The share of the way from the first to the second, 0 to 1.
-        aspect: The picture's width / height.
+        first, second: The strokes (n, 2) of the drawings, in fractions of the picture.
+        u: The share of the way from the first drawing to the second, 0 to 1. At 0 and 1 the result is that drawing.
+        aspect: The picture's width / height, for measuring distances.
     """
     before, after = ([np.asarray(stroke, dtype=np.float64) for stroke in strokes] for strokes in (first, second))
     if u <= 0:
@@ -108,14 +109,14 @@ def mapped(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:
 def transform(
     strokes: Iterable[ArrayLike], location: ArrayLike, rotation: float, scale: float, aspect: float
 ) -> tuple[np.ndarray, ...]:
-    """Return strokes scaled, turned and moved about the centre of their common bounding box.
+    """Return strokes scaled, turned and moved, all about the centre of their common bounding box.
 
     Args:
-        strokes: (n, 2) each.
-        location: By how much they move, in fractions of the picture.
+        strokes: Points (n, 2) each, in fractions of the picture, y up.
+        location: By how much they move: x as a fraction of the picture's width, y of its height.
         rotation: Degrees counter-clockwise.
         scale: A factor.
-        aspect: The picture's width / height, so that circles stay round.
+        aspect: The picture's width / height, so that the rotation keeps shapes.
     """
     strokes = [np.asarray(s, dtype=np.float64) for s in strokes]
     if not strokes:
@@ -138,20 +139,22 @@ def taken_back(
 
 @dataclass(frozen=True)
 class Drawings:
-    """What is drawn of a region over time, before the region's keys move it.
+    """What is drawn of a region over time, before the keys of the region's placement move it.
 
-    A drawing is a list of strokes (n, 2) at a frame. Between two drawings, strokes change from one to the other.
+    A drawing is a list of strokes (n, 2) at a frame. Between two drawings, strokes change gradually from one to the
+    other.
 
     Attributes:
-        name: The region's, for errors.
+        name: The region's name, for error messages.
         frames: The frames of the drawings, ascending.
-        strokes: The drawings.
-        eases: The ease from each drawing to the next.
+        strokes: The strokes of each drawing; None for a drawing that is not needed.
+        eases: For each drawing, how strokes change from it to the next one.
         aspect: The picture's width / height.
-        placement: Channel of the matrix (3, 3) from the strokes' coordinates to fractions of the picture, or of None
-            where the strokes are not visible. Without a channel, strokes are fractions of the picture.
-        origins: The region's placement at the time of each drawing. It is taken out of the strokes, so that the
-            region's keys bring them back to where they were drawn. Empty: the region was in its place.
+        placement: Channel of the affine matrix (3, 3) that converts strokes to fractions of the picture, or of None at
+            frames where no strokes are visible. Without a channel, strokes already are fractions of the picture.
+        origins: The placement that the region had when each drawing was made. Drawn strokes include it, so its inverse
+            is applied to them, before keys place the region; only used with a `placement`. Empty: there is nothing to
+            remove.
     """
 
     name: str
@@ -163,10 +166,12 @@ class Drawings:
     origins: tuple[Placement, ...] = ()
 
     def at(self, frame: float) -> list[np.ndarray]:
-        """Return the strokes (n, 2) at a frame in fractions of the picture, before the region's keys move them.
+        """Return the strokes (n, 2) at a frame, in fractions of the picture, before keys move the region.
+
+        The list is empty without drawings, or where strokes are not visible.
 
         Raises:
-            EffectError: They are beyond limits.MAX_DISTANCE.
+            EffectError: A coordinate is beyond ±limits.MAX_DISTANCE; this is checked only if there is a `placement`.
         """
         if not self.frames:
             return []
@@ -174,11 +179,11 @@ class Drawings:
         return between_strokes(self.drawing(before, frame), self.drawing(after, frame), share, self.aspect)
 
     def moved(self, frame: float, placed: Placement) -> tuple[np.ndarray, ...]:
-        """Return the strokes at a frame as `at` does, moved, turned and scaled about their centre.
+        """Return the strokes at a frame, moved, turned and scaled about their centre by the region's keys.
 
         Args:
             frame: The frame.
-            placed: Where the region's keys put them.
+            placed: The placement that the region's keys give it.
 
         Raises:
             EffectError: As for `at`.
@@ -186,11 +191,13 @@ class Drawings:
         return transform(self.at(frame), placed.location, placed.rotation, placed.scale, self.aspect)
 
     def drawing(self, index: int, frame: float) -> list[np.ndarray]:
-        """Return the strokes (n, 2) of one drawing in fractions of the picture at a frame, before keys move them.
+        """Return the strokes (n, 2) of one drawing, in fractions of the picture, before keys move the region.
+
+        The list is empty where strokes are not visible.
 
         Args:
-            index: Which drawing.
-            frame: The frame; `placement` can change over time.
+            index: The index of the drawing.
+            frame: The frame at which `placement` and so the strokes' place is wanted. It need not be the drawing's own.
 
         Raises:
             EffectError: As for `at`.
@@ -209,14 +216,15 @@ class Drawings:
 
 
 def rasterise(shapes: Iterable[Shape], width: int, height: int, *, border: bool = False) -> np.ndarray:
-    """Return which shutter is drawn on each pixel: labels (height, width) uint16.
+    """Return which shutter is drawn on each pixel: labels (height, width) uint16, the top row first.
 
-    A label is 1 + the shutter's index if a shape covers the pixel's centre, else 0. Later shapes lie over earlier ones.
+    A label is 1 + the shutter's index if a shape covers the pixel's middle, else 0. Later shapes lie over earlier ones.
+    A line is at least 1.4 pixels wide. A lasso that encloses no pixel's middle is drawn as such a line.
 
     Args:
-        shapes: The shapes.
+        shapes: The shapes. Their opacities do not count.
         width, height: Of the picture, in pixels.
-        border: Whether the pixels at the picture's edge get the label of the first shutter, beneath all shapes.
+        border: Whether the pixels along the picture's edge get the label of shutter 0, beneath all shapes.
     """
     labels = np.zeros((height, width), dtype=np.uint16)
     if border:
@@ -253,15 +261,17 @@ def _draw(labels: np.ndarray, points: np.ndarray, radius: float, label: int) -> 
 
 
 def _seen(starts: np.ndarray, steps: np.ndarray, size: np.ndarray, reach: float) -> np.ndarray:
-    """Return which part of each line segment is near a picture: from and to which share of its length, 0 to 1, (2, n).
+    """Return which part of each line segment is inside the picture or near it, so that only that part is drawn.
 
     Args:
-        starts, steps: (n, 2), the segments' starts, and the way to their ends, in pixels.
-        size: Of the picture (width, height).
-        reach: How far outside of the picture still counts as near, in pixels.
+        starts: Where the segments start, (n, 2) in pixels.
+        steps: The vectors from the starts to the ends, (n, 2) in pixels.
+        size: Width and height of the picture, in pixels.
+        reach: How far outside of the picture is near, in pixels.
 
     Returns:
-        If a segment is nowhere near, its first share is above its second.
+        (2, n): where the part begins and where it ends, each as a share 0 to 1 of the segment's length. If a segment is
+        nowhere near, its first share is above its second.
     """
     inside = (starts >= -reach) & (starts <= size + reach)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):

@@ -33,9 +33,9 @@ class ShutterError(ValueError):
 
 
 def check_bars(bars: ArrayLike) -> np.ndarray:
-    """Return bars as a float64 array (L,): 1 to 256 numbers from 0 to a million, with a sum of at least a millionth.
+    """Return bars as a float64 array (L,), if they are valid: 1 to 256 finite numbers, each 0 to a million.
 
-    The sum counts as float32, since Blender has no other numbers.
+    Their sum must be at least a millionth in float32, in which Blender stores numbers.
 
     Raises:
         ShutterError: The bars are invalid.
@@ -92,11 +92,17 @@ def quantile(bars: ArrayLike) -> Quantile:
 
 
 def knots(shutters: ArrayLike) -> Quantile:
-    """Return the quantiles of N shutters (N, L) with common z; start and end have shape (K, N).
+    """Return the quantiles of N shutters, divided into the same pieces, so that they can be mixed piece by piece.
 
-    A pixel that mixes the shutters by coefficients c (N,) then has a quantile whose piece k runs from c·start[k] to
-    c·end[k], with the same z. Bounds where no shutter jumps or bends are left out: a box has one piece, whatever its
-    length.
+    A pixel that mixes the shutters by coefficients c (N,) has the quantile whose piece k runs from c·start[k] to
+    c·end[k], with the same z. Two pieces are one if no shutter closes or changes its height between them: shutters that
+    each have one block of equal bars need one piece, however long they are.
+
+    Args:
+        shutters: Bars (N, L).
+
+    Returns:
+        A Quantile with K pieces; start and end have the shape (K, N).
     """
     parts = [quantile(bars) for bars in np.atleast_2d(shutters)]
     levels = np.unique(np.concatenate([part.z for part in parts]))
@@ -116,11 +122,14 @@ def knots(shutters: ArrayLike) -> Quantile:
 
 
 def _on_levels(part: Quantile, levels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Split the pieces of a quantile at more bounds z. Return the times at which each new piece starts and ends.
+    """Divide the pieces of one shutter's quantile at more bounds z.
 
     Args:
         part: The quantile.
-        levels: The new bounds (n + 1,), which contain its own within rounding.
+        levels: The new bounds (n + 1,) from 0 to 1, ascending. They include all bounds of `part`, within rounding.
+
+    Returns:
+        The times (n,) at which each new piece starts, and the times (n,) at which it ends, in frames of the window.
     """
     middle = (levels[:-1] + levels[1:]) / 2
     piece = np.clip(np.searchsorted(part.z, middle) - 1, 0, len(part.start) - 1)
@@ -132,14 +141,15 @@ def _on_levels(part: Quantile, levels: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
 
 def weights(start: np.ndarray, end: np.ndarray, dz: np.ndarray, window: int) -> np.ndarray:
-    """Return how much of the light each frame of a window gets, (…, L) with the sum 1, for quantiles of many pixels.
+    """Return which share of the light each of the L frames of a window gets, for many pixels: (…, L) with the sum 1.
 
-    q(τ) = Q(τ + 1) − Q(τ): each piece spreads its share of the light evenly over the time from its start to its end.
+    Each piece of a pixel's quantile spreads its share of the light evenly from its start time to its end time: q(τ) =
+    Q(τ + 1) − Q(τ), with Q the inverse of the quantile.
 
     Args:
-        start, end: The times of the pieces, (…, K).
-        dz: The pieces' shares of the light, (K,).
-        window: L.
+        start, end: When each pixel's K pieces start and end, in frames of the window, (…, K).
+        dz: The share of the light of each piece, (K,), the same for all pixels.
+        window: The number of frames L.
     """
     pixels = tuple(range(start.ndim - 1))
     begun, over = start.min(axis=pixels), end.max(axis=pixels)
@@ -172,9 +182,15 @@ def displace(shutters: ArrayLike, coefficients: ArrayLike) -> np.ndarray:
 
 
 def mix(shutters: ArrayLike, coefficients: ArrayLike) -> np.ndarray:
-    """Interpolate N shutters by value, as a cross-fade: bars (…, L) of Σ cᵢ sᵢ/eᵢ, scaled to the exposure e(q).
+    """Interpolate N shutters by value, as a cross-fade between the pictures that they make.
 
-    Arguments as for `displace`.
+    Args:
+        shutters: Bars (N, L).
+        coefficients: (…, N), ≥ 0, with the sum 1.
+
+    Returns:
+        Bars (…, L): the weighted mean of the shutters, each scaled to the sum 1 first, and then scaled to the exposure
+        e(q) = Σ cᵢ eᵢ, as for `displace`.
     """
     shutters = np.atleast_2d(np.asarray(shutters, dtype=np.float64))
     coefficients = np.asarray(coefficients, dtype=np.float64)
@@ -197,9 +213,13 @@ def are_open(bars: np.ndarray) -> np.ndarray:
 
 
 def resample(bars: ArrayLike, window: int) -> np.ndarray:
-    """Return bars (window,) of the same shape for a window of another length.
+    """Return bars of the same shape for a window of another length: stretched, or averaged where it is shorter.
 
-    The mean height of the bars stays. So does the shutter angle, if no bars are averaged.
+    The mean of the bars stays. So does the angle of a rotary shutter (`open_angle`), if the highest bar does.
+
+    Args:
+        bars: (L,).
+        window: The new number of bars.
     """
     bars = np.asarray(bars, dtype=np.float64)
     total = np.concatenate([[0.0], np.cumsum(bars)])
@@ -208,7 +228,9 @@ def resample(bars: ArrayLike, window: int) -> np.ndarray:
 
 
 def spanning(bars: ArrayLike, start: float, end: float) -> np.ndarray:
-    """Stretch or shrink the open part of bars (L,) in time, and keep its shape and sum.
+    """Stretch or shrink bars (L,) in time so that the shutter opens and closes at given times. Shape and sum stay.
+
+    What is stretched is the span from the first open bar to the last, with closed ones in between.
 
     Args:
         bars: (L,).
@@ -225,20 +247,21 @@ def spanning(bars: ArrayLike, start: float, end: float) -> np.ndarray:
 def smoothed(bars: ArrayLike, steps: int, *, backward: bool = False, level: bool = False) -> np.ndarray:
     """Spread the bars (L,) of filmed frames over moments, which are filmed frames and those made between them.
 
-    The time between two frames is exposed if both of their bars are open: each bar spreads its weight evenly over the
-    half intervals towards its open neighbours. A bar without open neighbours exposes only the filmed frame.
+    The time between two filmed frames is exposed only if both bars are open. Then each bar spreads its weight evenly
+    over its half of the interval towards each open neighbour. A bar without open neighbours exposes its filmed frame
+    only.
 
     Args:
         bars: (L,).
         steps: Moments per filmed frame, 1 or an even number.
-        backward: Whether the footage plays backward, so that a bar's frame is the last of its moments.
-        level: Whether the moments beside a frame are as high as its bar, and the middle between two frames as high as
-            the mean of their bars. This is for the lightest or darkest of all moments. Otherwise, each bar keeps its
-            sum.
+        backward: Whether the footage plays backward. A filmed frame then is the last of its moments, not the first.
+        level: Whether bars are heights instead of amounts of light: moments next to a filmed frame are as high as its
+            bar, and one in the middle of two frames is as high as the mean of both. This is for the lightest or darkest
+            of all moments. Otherwise, each bar's moments add up to the bar.
 
     Returns:
-        Bars of moments (L · steps,), scaled to the sum of all `bars` in both cases. Moment k · steps is filmed frame k,
-        backward k · steps + steps − 1.
+        The moments' bars (L · steps,), with the sum of `bars` in either case. Filmed frame k is moment k · steps;
+        backward, it is moment k · steps + steps − 1.
     """
     bars = np.asarray(bars, dtype=np.float64)
     if steps == 1:
@@ -268,10 +291,14 @@ def _open_beside(bars: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def held(bars: ArrayLike, steps: int) -> np.ndarray:
-    """Spread each bar (L,) of a filmed frame evenly over the `steps` moments (this frame, and those made after it).
+    """Spread the bar of each filmed frame evenly over its `steps` moments: the frame itself, and those made after it.
+
+    Args:
+        bars: (L,).
+        steps: Moments per filmed frame.
 
     Returns:
-        Bars of moments (L · steps,) with the same sum.
+        The moments' bars (L · steps,), with the same sum.
     """
     return np.repeat(np.asarray(bars, dtype=np.float64) / steps, steps)
 
@@ -280,9 +307,10 @@ class Filmed(NamedTuple):
     """The result of `filmed`: bars of filmed frames that replace the bars of moments in an older recipe.
 
     Attributes:
-        bars: (L,).
-        lost: None if the new bars expose the same moments as the old ones. Otherwise, the moments of the filmed frame
-            where they differ most: the numbers of the first and the last one, from 1.
+        bars: The new bars, (L,).
+        lost: None: the new bars expose the same moments as the old ones, except for an invisible difference. Otherwise,
+            the numbers, from 1, of the first and last old bar of the filmed frame at which they differ most, for a
+            warning.
     """
 
     bars: np.ndarray
@@ -290,17 +318,20 @@ class Filmed(NamedTuple):
 
 
 def filmed(moments: ArrayLike, steps: int, position: str, spread: Callable[[np.ndarray], np.ndarray]) -> Filmed:
-    """Convert bars of moments (filmed frames, and those made between them) into bars of filmed frames.
+    """Convert bars of moments, which recipes of version 1 have, into bars of filmed frames.
 
-    Recipes of version 1 have bars of moments. If the window ends within a filmed frame, that one counts as a whole: the
-    last one, or the first if `position` is "end".
+    Moments are filmed frames, and those made between them. If the old window does not end at a whole filmed frame, it
+    is padded with zeros: after its last moment, or before its first one if `position` is "end".
 
     Args:
-        moments: (n,).
+        moments: (n,), the old bars.
         steps: Moments per filmed frame.
         position: Options.position.
-        spread: Turns the new bars into bars of moments. If no new bars give the old moments again, each new bar is the
-            mean of its frame's moments.
+        spread: Turns bars of filmed frames (L,) into the bars of moments (L · steps,) that they now expose.
+
+    Returns:
+        New bars that `spread` turns into the old moments again, if any are found. Otherwise each new bar is the mean of
+        its frame's moments, and `lost` says where that differs.
     """
     moments = np.asarray(moments, dtype=np.float64)
     lacking = -len(moments) % steps
@@ -407,8 +438,9 @@ def preset_bars(name: str, window: int, position: str = "start") -> np.ndarray:
 
     Args:
         name: A key of PRESETS.
-        window: The number of bars.
-        position: Options.position, on which the bar of the shown frame depends ("STILL").
+        window: The number of bars L.
+        position: Options.position. It matters only for "STILL": bar 0 is open for "start", a middle one for "center",
+            the last one for "end".
 
     Raises:
         KeyError: There is no such preset.

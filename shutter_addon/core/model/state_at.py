@@ -35,12 +35,12 @@ from .motions import Placement, Similarity
 
 
 class Moment(NamedTuple):
-    """The state of an effect at a timeline frame, and the frame of the footage that is shown there.
+    """What an effect needs for a picture at one timeline frame: its state, and the footage's frame shown there.
 
     Attributes:
-        source_frame: The shown frame of the clip, from 0.
-        state: The effect.
-        direction: 1, or −1 where the footage plays backward.
+        source_frame: The footage's shown frame, from 0, counting moments (frames made between two filmed ones).
+        state: The effect's state.
+        direction: 1 where the footage plays forward, −1 where it plays backward.
     """
 
     source_frame: int
@@ -49,10 +49,16 @@ class Moment(NamedTuple):
 
 
 def state_at(effect: Effect, clip: Clip, frame: float) -> Moment:
-    """Return an effect's state at a timeline frame, with everything that does not need the footage's pictures.
+    """Return an effect's state at a timeline frame, complete except for what needs the footage's pictures.
 
-    Beyond Effect.at, it has bars of moments, exposures with lengths of their own, followed motions, and layers. Cuts
-    are not considered yet, since no frame is read.
+    In addition to Effect.at, its bars are those of moments (frames made between two filmed ones), exposures have the
+    length that a motion or the timeline sets, and it has followed motions and layers. Cuts in the footage do not matter
+    here: they are only found by reading pictures.
+
+    Args:
+        effect: The effect.
+        clip: The footage. If the effect has a `time` of its own, that replaces the clip's timing.
+        frame: The timeline frame, possibly between two whole ones.
 
     Raises:
         EffectError: No picture can be made of the effect.
@@ -69,10 +75,16 @@ def state_at(effect: Effect, clip: Clip, frame: float) -> Moment:
 
 
 def _in_moments(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameState:
-    """Return the state with bars and window in the clip's moments: filmed frames, and those made between them.
+    """Return the state with its bars and window in moments: filmed frames, and those that are made between them.
 
-    There are `clip.step` moments per filmed frame. Bars that are only the shape of an exposure are spread evenly, so
-    that the shape stays.
+    Options.window and Options.step count moments then. Bars that only give an exposure's shape are spread evenly over
+    their moments, so that the shape stays.
+
+    Args:
+        effect: The effect.
+        state: Its state at the shown frame, with bars of filmed frames.
+        clip: The footage; its `step` is the number of moments per filmed frame.
+        at: The shown frame.
     """
     options = replace(state.options, window=state.options.window * clip.step, step=clip.step, backward=at.direction < 0)
     if clip.step == 1:
@@ -86,6 +98,15 @@ def _in_moments(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> Fra
 
 def _layered(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameState:
     """Return the state with the effect's layers, and their mattes in all source frames that the picture may use.
+
+    These are the frames of the window, and those around it that are searched for the background (Options.plate_reach).
+    The state is unchanged if no layer is visible.
+
+    Args:
+        effect: The effect.
+        state: Its state at the shown frame, in moments.
+        clip: The footage.
+        at: The shown frame.
 
     Raises:
         EffectError: The strokes of a layer are too far outside the picture.
@@ -121,12 +142,12 @@ def _layered(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameS
 
 
 def _matte(region: Region | MatteRegion, frame: float, share: float) -> Matte | None:
-    """Return a region's matte between two timeline frames: that of the nearer one. A region of strokes has none.
+    """Return a region's matte at a time between two timeline frames: that of the nearer one, or the first halfway.
 
     Args:
-        region: The region.
-        frame: The timeline frame before.
-        share: The share of the way to the next frame, 0 to 1.
+        region: The region; one of strokes has no matte, so the result is None.
+        frame: The timeline frame before the time.
+        share: How far the time is from that frame to the next one, 0 to 1.
     """
     return region.at(frame + round(share)) if isinstance(region, MatteRegion) else None
 
@@ -134,17 +155,19 @@ def _matte(region: Region | MatteRegion, frame: float, share: float) -> Matte | 
 def _scribbles(
     effect: Effect, state: FrameState, drawn: Sequence[tuple[int, Region]], count: int, frame: float, share: float
 ) -> FrameState:
-    """Return a state with the shapes of regions between two timeline frames, for Layers.scribbles.
+    """Return the state that stands for the drawn layers in one source frame (Layers.scribbles).
 
-    Shutter 1 + i of this state stands for layer i, and shutter 0 for what belongs to no layer.
+    Its shutter 1 + i stands for layer i, and its shutter 0 for what belongs to no layer. Its scribbles are opaque;
+    regions whose opacity is 0 have none.
 
     Args:
         effect: The effect.
-        state: Its state at the shown frame, for the options.
-        drawn: Regions, later ones on top, each with 1 + its layer's number, or 0 without a layer.
-        count: The number of layers.
-        frame: The timeline frame before.
-        share: The share of the way to the next frame, 0 to 1.
+        state: The effect's state at the shown frame, whose options are used.
+        drawn: (1 + the layer's index, region) for each region of strokes, later ones on top; 0 instead for a region
+            that is no layer.
+        count: The number of layers, drawn or not.
+        frame: The timeline frame before the source frame is shown.
+        share: How far the source frame's time is from that frame to the next one, 0 to 1.
     """
     placed = [(number, _between(region, frame, share)) for number, region in drawn]
     shapes = tuple(replace(shape, shutter=number, opacity=1.0) for number, shape in placed if shape.opacity > 0)
@@ -170,10 +193,18 @@ Places = Callable[[float], tuple[Placement, np.ndarray | None]]
 
 
 def followed(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameState:
-    """Add the motions that shutters follow to the state, and the lengths of exposures that depend on these motions.
+    """Return the state with the motions that shutters follow, and with exposures whose length depends on these motions.
+
+    The state is unchanged if no shutter follows anything.
+
+    Args:
+        effect: The effect.
+        state: Its state at the shown frame, in moments.
+        clip: The footage.
+        at: The shown frame.
 
     Raises:
-        EffectError: The strokes of something followed are too far outside the picture.
+        EffectError: The strokes of something that is followed are too far outside the picture.
     """
     if not any(shutter.follow for shutter in effect.shutters):
         return state
@@ -199,7 +230,15 @@ def followed(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameS
 def _with_trails(effect: Effect, state: FrameState, following: Following, clip: Clip, at: Shown) -> np.ndarray:
     """Return the state's bars (N, L), stretched or shortened where a motion sets the exposure's length.
 
-    Trails are open while what they follow moves by their distance; Camera.influence shortens the camera's exposures.
+    A shutter of the length "motion" is open while the subject that it follows moves by the shutter's distance
+    (Shutter.trail). Exposures that follow the camera are then shortened by Camera.influence.
+
+    Args:
+        effect: The effect.
+        state: Its state at the shown frame, in moments.
+        following: The motion of each shutter's subject in each source frame.
+        clip: The footage.
+        at: The shown frame.
     """
     bars = state.bars.copy()
     positions = windows.positions(state.options, at.source_frame, at.direction)
@@ -220,9 +259,10 @@ def _with_trails(effect: Effect, state: FrameState, following: Following, clip: 
 
 
 def reach(filmed: int) -> int:
-    """Return how many timeline frames before and after the shown one are searched for a window's source frames.
+    """Return how many timeline frames on each side of the shown one are searched for a window's source frames.
 
-    This is 4 × the window, enough for footage at a quarter of its speed. Source frames beyond get the nearest motion.
+    This is 4 × the window, enough for footage that is slowed down to a quarter of its speed. Source frames that are not
+    found get the motion of the nearest one.
 
     Args:
         filmed: The number of filmed frames in the window.
@@ -231,12 +271,15 @@ def reach(filmed: int) -> int:
 
 
 def seen(options: Options, at: Shown, count: int) -> range:
-    """Return the source frames that a window may show, wherever the cuts around it lie.
+    """Return all source frames that the window can show, whichever cuts there are in the footage.
+
+    The range lies in the footage. It always includes the shown frame, and is wider if the window can be moved away from
+    a cut ("slide") or folded back at an end ("mirror").
 
     Args:
-        options: The state's options.
+        options: The state's options, in moments.
         at: The shown frame.
-        count: The number of source frames.
+        count: The number of source frames of the footage.
     """
     positions = windows.positions(options, at.source_frame, at.direction)
     if options.edges == "slide" and options.stop_at_cuts:  # a cut may lie on either side
@@ -247,17 +290,17 @@ def seen(options: Options, at: Shown, count: int) -> range:
 
 
 def times_of(clip: Clip, at: Shown, wanted: range, reach: int) -> list[float]:
-    """Return a timeline time for each wanted source frame: when the timeline shows it, nearest to the shown frame.
+    """Return the timeline time at which each wanted source frame is shown, the one nearest to the shown frame.
 
     Args:
         clip: The footage.
         at: The shown frame.
-        wanted: The source frames.
-        reach: Timeline frames before and after the shown one that are searched. A source frame that is not shown there
-            has the time of the nearest one that is.
+        wanted: The source frames, including the shown one.
+        reach: How many timeline frames before and after the shown one are searched. A source frame that is not found
+            gets the time of the nearest source frame that is.
 
     Returns:
-        Timeline frames, with a fraction if the timeline skips the source frame.
+        A timeline frame for each of `wanted`, with a fraction if the timeline skips that source frame.
     """
     times, last = {at.source_frame: at.frame}, {1: at.source_frame, -1: at.source_frame}
     for distance in range(1, reach + 1):
@@ -285,12 +328,14 @@ def smoothing(smooth: int) -> np.ndarray:
 
 
 def places_of(subject: Subject, motion: motions.Motion = "scale", smooth: int = 0) -> Places:
-    """Return a function of a timeline frame that gives a subject's placement and centre, as a shutter follows it.
+    """Return a function that gives a subject's placement and centre at a timeline frame, as a shutter follows it.
+
+    The centre is None where nothing is drawn, or with smoothing, at any of the averaged frames.
 
     Args:
         subject: The region or camera.
-        motion: What counts of its motion.
-        smooth: Frames on each side over which it is averaged.
+        motion: Which of the placement's parts are used, as in motions.only; the others have no effect.
+        smooth: How many frames on each side placement and centre are averaged over (`smoothing`). 0: they are not.
     """
 
     @cache
@@ -313,26 +358,34 @@ def places_of(subject: Subject, motion: motions.Motion = "scale", smooth: int = 
 
 
 def moves(places: Places, clip: Clip, frame: float, times: list[float]) -> np.ndarray:
-    """Return the motions by which a subject goes from a timeline frame to n times: turns and shifts, (2, n) complex128.
+    """Return how a subject moves from one timeline frame to n other times.
 
     Args:
         places: From `places_of`.
         clip: The footage, for the picture's size.
-        frame: The timeline frame.
-        times: n timeline frames, possibly with fractions.
+        frame: The timeline frame at which the motions begin.
+        times: The n timeline frames at which they end, possibly with fractions.
+
+    Returns:
+        The motions' turns and shifts, (2, n) complex128, as in motions.Similarity.
     """
     found = [motion_to(places, frame, time, (clip.width, clip.height)) for time in times]
     return np.array([(motion.turn, motion.shift) for motion in found], np.complex128).T
 
 
 def motion_to(places: Places, frame: float, time: float, size: tuple[int, int]) -> Similarity:
-    """Return the motion by which a subject goes from a timeline frame to a time; no motion if nothing is drawn.
+    """Return the motion by which a subject goes from a timeline frame to another time.
 
     Args:
         places: From `places_of`.
-        frame: The timeline frame.
-        time: A timeline frame, possibly with a fraction; the motion is linear between two frames.
-        size: Of the picture (width, height).
+        frame: The timeline frame at which the motion begins.
+        time: The time at which it ends, a timeline frame, possibly with a fraction. Placements are linear between two
+            frames.
+        size: Width and height of the picture, in pixels.
+
+    Returns:
+        The motion; Similarity(), which moves nothing, if nothing is drawn at one of the frames, or if the subject's
+        scale is almost 0 at `frame`.
     """
     whole = frame + math.floor(time - frame)
     share = time - whole
@@ -354,13 +407,14 @@ _LEAST = 1e-9
 
 
 def travelled(places: np.ndarray) -> np.ndarray:
-    """Return how far something has moved at the boundaries of the window's bars: (L + 1,), ascending from 0.
+    """Return how far something has moved by each boundary of the window's L bars: (L + 1,), ascending from 0.
 
-    The point that moves farthest counts, frame by frame. Half of the way between two frames belongs to each of their
-    bars. The first and the last bar go on at the pace beside them.
+    From frame to frame the point that moves farthest counts. A bar has half of the distance from the frame before and
+    half of that to the frame after. The first and last bar lack one side, and count the other twice.
 
     Args:
-        places: (L, P) complex, where P of its points lie in the window's frames.
+        places: Where the thing's P points lie in each of the window's frames, (L, P) complex, in pixels. The result has
+            the same unit.
     """
     steps = np.abs(np.diff(places, axis=0)).max(axis=1, initial=0)
     if not steps.size:
@@ -370,12 +424,15 @@ def travelled(places: np.ndarray) -> np.ndarray:
 
 
 def shortened(bars: np.ndarray, share: float, shown: float) -> np.ndarray:
-    """Return bars (L,) of the same shape and sum that are open for a share of their time, but at least for one frame.
+    """Return bars (L,) whose open part is shortened to a share of its time. Shape and sum stay.
+
+    It shrinks towards the shown frame, and lasts for at least one frame.
 
     Args:
         bars: (L,).
-        share: 0 to 1. The time shrinks towards the shown frame.
-        shown: The middle of the shown frame's bar, in 0 … L; clamped to the open bars.
+        share: 0 to 1; at 0 the open part lasts for one frame, at 1 it keeps its length.
+        shown: The middle of the shown frame's bar, as a time in 0 … L. If the frame lies outside the open part, the
+            nearest end of that takes its place.
     """
     bars = np.where(shutters.are_open(bars), bars, 0)
     first, last = shutters.open_span(bars)
@@ -385,16 +442,16 @@ def shortened(bars: np.ndarray, share: float, shown: float) -> np.ndarray:
 
 
 def with_length(bars: np.ndarray, way: np.ndarray, length: float, shown: float) -> np.ndarray:
-    """Return bars (L,) of the same shape and sum that are open while something moves by a distance.
+    """Return bars (L,) that are open while something moves by a given distance. Shape and sum stay.
 
-    If it does not move as far, they are open for the whole window.
+    Their open part is stretched or shrunk. If the thing does not move that far, it lasts for the whole window.
 
     Args:
         bars: (L,).
-        way: How far it has moved at the bars' boundaries (L + 1,), from `travelled`.
+        way: How far the thing has moved by the boundaries of the bars, (L + 1,), from `travelled`.
         length: The distance, in the same unit.
-        shown: The time in 0 … L that keeps its place, clamped to the open bars. If the exposure reaches one end of the
-            window, it only grows towards the other.
+        shown: The time, in 0 … L, of the shown frame's middle: it keeps its relative place in the open part. An open
+            part that reaches one end of the window grows only towards the other end.
     """
     bars = np.where(shutters.are_open(bars), bars, 0)
     first, last = shutters.open_span(bars)
@@ -436,15 +493,17 @@ def exposed(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameSt
 
 
 def on_timeline(bars: np.ndarray, options: Options, positions: np.ndarray) -> np.ndarray:
-    """Return bars (L,) of the window for bars that shape an exposure of one timeline frame. Their sum stays.
+    """Return bars (L,) of the window from bars that only give the shape of an exposure of one timeline frame.
 
-    By Options.position, the exposure begins with the shown filmed frame, has its middle there, or ends with it. What
-    lies outside the window is left out.
+    The shape is spread over what the footage plays in that timeline frame: from the start of the shown filmed frame on
+    ("start" in Options.position), around its middle ("center"), or up to its end ("end"). What lies beyond the window
+    is left out, and the rest is scaled to the sum of `bars`. If the footage stands still, or all lies outside, only the
+    shown frame is exposed.
 
     Args:
         bars: (L,), the shape.
-        options: Of the state.
-        positions: The footage's positions (Clip.position) at n times (n odd) at even distances, from the previous
+        options: Of the state, in moments.
+        positions: Where the footage is (Clip.position) at an odd number of times, evenly spaced from the previous
             timeline frame to the next one.
     """
     window, here = len(bars), positions[len(positions) // 2]
@@ -468,9 +527,12 @@ def on_timeline(bars: np.ndarray, options: Options, positions: np.ndarray) -> np
 
 
 def _spread(start: float, end: float, window: int) -> np.ndarray:
-    """Return which share (L,) of the time from `start` to `end` falls on each of a window's L frames.
+    """Return which share (L,) of the time from `start` to `end` falls on each frame of a window of L frames.
 
-    Times are in frames from the window's start. What lies outside is lost. A time without length falls on one frame.
+    Args:
+        start, end: Times in frames from the window's start, start ≤ end. The part outside the window is lost, so that
+            the sum is less than 1. If they are almost equal, the frame that they lie in gets 1.
+        window: The number of frames L.
     """
     if end - start < _INSTANT:
         return (np.arange(window) == np.floor(start + _INSTANT)).astype(float)

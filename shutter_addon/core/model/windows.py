@@ -15,25 +15,28 @@ from .frame_state import FrameState, Options
 
 
 def positions(options: Options, index: int, direction: int = 1) -> np.ndarray:
-    """Return the frame numbers (L,) of a window around a shown frame, as if the footage had no ends.
+    """Return the source frame (L,) at each place of a window around a shown frame, as if the footage had no ends.
 
-    They are in the window's order, from its first frame to its last.
-
-    A filmed frame lasts until the next one. So if the footage plays backward, the moments after it come first, and the
-    filmed frame last.
+    The order is that of the window: time as the footage plays, so that numbers fall if it plays backward. A filmed
+    frame is followed by its moments, made between it and the next one. Backward, it comes last, after its moments.
 
     Args:
         options: Of the state.
         index: The shown source frame.
-        direction: 1, or −1 if the footage plays backward: later frames of the window then have lower positions.
+        direction: 1 if the footage plays forward, −1 if backward.
     """
     return origin(options, index, direction) + direction * np.arange(options.window)
 
 
 def reach(state: FrameState, index: int, direction: int = 1) -> tuple[int, int]:
-    """Return the lowest and the highest position, as a frame number of the footage, that any shutter exposes.
+    """Return the lowest and the highest position (frame number of the footage) that any shutter exposes.
 
-    Positions can lie beyond the footage. Arguments as for `positions`.
+    They can lie beyond the footage's ends. If a shutter has a threshold, the shown frame is always included.
+
+    Args:
+        state: The state; its bars tell which places of the window are open.
+        index: The shown source frame.
+        direction: As for `positions`.
     """
     first = origin(state.options, index, direction)
     ends = [first + direction * place for place in (state.open_span[0], state.open_span[1] - 1)]
@@ -41,24 +44,29 @@ def reach(state: FrameState, index: int, direction: int = 1) -> tuple[int, int]:
 
 
 def origin(options: Options, index: int, direction: int = 1) -> int:
-    """Return the position of the window's first frame, as a frame number of the footage, possibly beyond its ends.
+    """Return the position (frame number of the footage) of the window's first frame, also beyond the footage.
 
-    Arguments as for `positions`.
+    Args:
+        options: Of the state.
+        index: The shown source frame.
+        direction: As for `positions`.
     """
     return (index if direction > 0 else index + options.step - 1) - direction * options.before
 
 
 def slid(state: FrameState, index: int, direction: int, shot: range, *, whole: bool = False) -> FrameState:
-    """Return the state with exposures moved into the shot if its edges are "slide", else the state itself.
+    """Return the state with its exposures moved into a shot, for Options.edges "slide". Else the state is unchanged.
 
-    Each shutter moves only as far as it has to. An exposure that is longer than the shot covers it and goes beyond.
+    Each shutter moves no farther than needed to bring the filmed frames that it exposes, with their moments, into the
+    shot. An exposure longer than the shot covers all of it and reaches beyond.
 
     Args:
         state: The state.
         index: The shown source frame.
         direction: As for `positions`.
         shot: The source frames of the shot.
-        whole: Move the window even if no bars have to move, since trails may become as long as it is.
+        whole: Whether the window moves into the shot even if all open bars lie there already. Trails need this, since
+            they may become as long as the window.
     """
     options = state.options
     first, last_filmed = origin(options, index, direction), (shot.stop - 1) // options.step * options.step
@@ -85,15 +93,15 @@ def _filmed(span: tuple[int, int], options: Options) -> tuple[int, int]:
 
 
 def source_frames(options: Options, positions: np.ndarray, shot: range) -> np.ndarray:
-    """Return the source frame that a window shows at each of its positions; −1 for none.
+    """Return the source frame that the window uses at each position; −1 for a frame that is left out.
 
-    Beyond the shot's ends, "hold" and "slide" repeat its first or last frame, and "mirror" plays back from there
-    without repeating it. "shorten" leaves frames out, unless all are beyond: then it repeats the first or last frame,
-    too.
+    Beyond the shot's ends it depends on Options.edges: "hold" and "slide" use the first or last frame. "mirror" runs
+    back from the end, without using the last frame twice. "shorten" leaves frames out; if all would be, it uses the
+    first or last frame like "hold".
 
     Args:
         options: Of the state.
-        positions: From `positions`, any of them.
+        positions: Positions as from `positions`: all of them, or some.
         shot: The source frames between two cuts, or range(count) for a whole clip.
     """
     first, count = shot.start, len(shot)

@@ -27,13 +27,13 @@ MIDDLE = 1 / 8192
 
 
 class Sample(NamedTuple):
-    """A frame that contributes to a picture of lightest, darkest or median.
+    """A frame of the window, from which a lightest, darkest or median picture is made.
 
     Attributes:
-        light: (H, W, 4), premultiplied, as each pixel sees the frame.
-        weight: (H, W), how much the frame counts at each pixel.
-        shown: For the shown frame, its light (H, W, 4), which counts without regard to weights if there is a threshold;
-            None for other frames.
+        light: The frame as each pixel sees it, (H, W, 4), premultiplied. It has moved if a shutter follows a motion.
+        weight: (H, W), 0 to 1, how much the frame counts at each pixel.
+        shown: The shown frame's light, (H, W, 4). If there is a threshold, it counts in full, whatever the weights are.
+            None: this is not the shown frame.
     """
 
     light: np.ndarray
@@ -42,11 +42,12 @@ class Sample(NamedTuple):
 
 
 def counts(combine: Combine, bars: ArrayLike, coefficients: ArrayLike, interpolation: str) -> np.ndarray:
-    """Return how much each frame of the window counts for pixels: weights (…, L) for lightest, darkest or median.
+    """Return how much each frame of the window counts at each pixel for lightest, darkest or median: weights (…, L).
 
-    For a median these are the normalised interpolated bars. For lightest and darkest they are from 0 to 1: by
-    displacement the same times Σ cᵢ / (the highest of shutter i's), so that equal bars have weight 1; by value Σ cᵢ
-    (shutter i's bars / its highest).
+    For a median the weights are the interpolated bars, with the sum 1. For lightest and darkest they are 0 to 1, and
+    the frame at a shutter's highest bar has the weight 1. By value interpolation, each shutter's bars are divided by
+    their maximum and averaged by the coefficients. By displacement, each shutter's bars are divided by their sum and
+    interpolated, then multiplied by the mean of sum / maximum over the shutters, weighted by the coefficients.
 
     Args:
         combine: How frames are combined.
@@ -68,12 +69,12 @@ def counts(combine: Combine, bars: ArrayLike, coefficients: ArrayLike, interpola
 def of_samples(combine: Combine, samples: Sequence[Sample], *, encoded: bool = False) -> np.ndarray:
     """Return the lightest, darkest or median of frames: a premultiplied picture (H, W, 4).
 
-    It is black where all weights are 0.
+    The picture is transparent (all zeros) where all weights are 0.
 
     Args:
         combine: How frames are combined.
         samples: The frames, at least one.
-        encoded: Whether their light is encoded (Options.light).
+        encoded: Whether the samples' light is encoded like sRGB (Options.light "encoded"); otherwise it is linear.
     """
     if combine.mode == "median":
         return median(samples)
@@ -100,10 +101,15 @@ def of_samples(combine: Combine, samples: Sequence[Sample], *, encoded: bool = F
 
 
 def _counted(combine: Combine, sample: Sample, encoded: bool) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return a frame as a list of one or two pairs (light, weight), after the threshold of `combine`.
+    """Return what counts of a frame as a list of pairs: light (H, W, 4) and weight (H, W).
 
-    Without a threshold, the only pair is the frame itself. A threshold lowers its weight where the light does not pass.
-    The shown frame then has a second pair, with weight 1.
+    Without a threshold the only pair is the frame. With one, the frame's weight is lowered where its light does not
+    leave a trail (see `passes`). The shown frame then has a second pair: its light with weight 1, which is not lowered.
+
+    Args:
+        combine: How frames are combined; it may have a threshold.
+        sample: The frame.
+        encoded: Whether its light is encoded, as for `of_samples`.
     """
     if combine.threshold is None:
         return [(sample.light, sample.weight)]
@@ -138,13 +144,14 @@ def median(samples: Sequence[Sample]) -> np.ndarray:
 
 
 def weighted_median(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Return the weighted median (…) of values (L, …): the first value at which the sum of weights so far reaches half.
+    """Return the weighted median (…) of values along the first axis.
 
-    If it is within MIDDLE of half there, the median is a mix with the next value: equal parts at exactly half.
+    It is the lowest value at which the weights of all values up to it reach half of the total. If their sum is within
+    MIDDLE of half, the median is a mix of this value and the next higher one, in equal parts at exactly half.
 
     Args:
-        values: (L, …).
-        weights: (L, …), at least 0.
+        values: (L, …), in any order.
+        weights: (L, …), at least 0. A value with weight 0 does not count.
     """
     order = np.argsort(np.where(weights > 0, values, np.inf), axis=0, kind="stable")
     values, weights = (np.take_along_axis(a, order, axis=0) for a in (values, weights))
@@ -171,11 +178,14 @@ Moves = tuple[np.ndarray, np.ndarray]
 
 
 def mixed_shutter(state: FrameState, coefficients: ArrayLike) -> np.ndarray:
-    """Return the bars (…, L) of the shutter that a pixel has as a mix of all shutters.
+    """Return the bars (…, L) that a pixel's mix of shutters has, by Options.interpolation.
+
+    Only shutters that combine frames in the same way (a group of FrameState.groups) are interpolated with each other.
+    The groups' bars are averaged with the groups' shares of the coefficients.
 
     Args:
         state: The effect at a frame, with N shutters.
-        coefficients: How much of each shutter pixels get, (…, N); the sum is 1.
+        coefficients: How much of each shutter pixels get, (…, N), with the sum 1.
     """
     mixed, c = shutters.INTERPOLATIONS[state.options.interpolation], np.asarray(coefficients, dtype=np.float64)
     total = np.zeros((*c.shape[:-1], state.bars.shape[1]))
@@ -185,14 +195,15 @@ def mixed_shutter(state: FrameState, coefficients: ArrayLike) -> np.ndarray:
 
 
 def ways(state: FrameState, coefficients: np.ndarray) -> Iterator[tuple[list[int], np.ndarray, np.ndarray]]:
-    """Group shutters by how they combine frames (average, lightest, …). Yield one group after another.
+    """Group shutters by how they combine frames (FrameState.groups). Yield one group after another.
 
     Args:
-        state: The effect at a frame.
-        coefficients: Of all shutters, (N, …) ≥ 0.
+        state: The effect at a frame, with N shutters.
+        coefficients: How much of each shutter pixels get, (N, …) ≥ 0.
 
     Yields:
-        The indices of n shutters, the sum (…) of their coefficients, and these divided by the sum, (n, …).
+        For each group of n shutters a tuple of three: their indices; the share (…) of the group, which is the sum of
+        their coefficients; and their coefficients (n, …) divided by this sum (1/n each where it is 0).
     """
     for chosen in map(list, state.groups.values()):
         share = coefficients[chosen].sum(axis=0)
@@ -210,18 +221,21 @@ def compose(
 ) -> np.ndarray:
     """Return the picture (H, W, 4) float64 that the effect makes of a window of frames, scene-linear and premultiplied.
 
-    F = e(q) · ∫ V(t + ⌊Q⁻¹(z)⌋) dz (§3.1, §3.4.1), or the combination of `of_samples`. Shutters that combine frames in
-    different ways make a picture for each way; the coefficients mix these.
+    F = e(q) · ∫ V(t + ⌊Q⁻¹(z)⌋) dz (§3.1, §3.4.1): a mean of the frames V with the weights of a pixel's mixed shutter,
+    times its gain; or the lightest, darkest or median of the frames (`of_samples`). If shutters combine frames in
+    different ways, a picture is made for each way, and the pictures are mixed by the coefficients.
 
     Args:
         state: The effect at this frame, with N shutters of L bars.
-        frames: L pictures (H, W, 4), scene-linear, premultiplied.
-        present: (L,) bool, False for left out frames, whose share goes to the others. If none has a share, it goes to
-            the nearest present frame, preferring the earlier one.
-        coefficients: (N, H, W), how much of each shutter a pixel gets; their sum is 1.
-        moves: Turns and shifts (L, N) of frames for shutters (FrameState.following). A frame is sampled at Σ cᵢ Wᵢ(x)
-            instead of x, or by value interpolation at each Wᵢ(x) and mixed. None: nothing is followed.
-        sharp: How `seen` samples frames; None: sharp if all of them are opaque.
+        frames: The L pictures (H, W, 4) of the window, scene-linear, premultiplied.
+        present: (L,) bool, False for frames that are left out. The others share their weight in proportion. If these
+            have none at a pixel, the present frame nearest to the middle of the exposure gets all, the earlier one of
+            two.
+        coefficients: (N, H, W), how much of each shutter a pixel gets, with the sum 1.
+        moves: The turns and the shifts of frames for shutters, (L, N) each (FrameState.following). With Wᵢ(x) the place
+            in the frame that shutter i sees at pixel x, the frame is sampled at Σ cᵢ Wᵢ(x); by value interpolation at
+            each Wᵢ(x), and the samples are mixed. None: nothing is followed.
+        sharp: Whether `seen` samples frames sharply. None: if all frames are opaque.
     """
     if sharp is None:
         sharp = all((frame[..., 3] == 1).all() for frame in frames)
@@ -274,14 +288,15 @@ def _samples(
     moves: Moves | None,
     looks_at: Callable[[int], list[np.ndarray]],
 ) -> list[Sample]:
-    """Return the Samples of frames that are present and count for some pixel.
+    """Return a Sample for each frame that is present and has a weight at some pixel.
 
-    If shutters follow several motions, a pixel sees a frame in several places. These are mixed by the weight of each.
+    The shown frame is included in any case if there is a threshold and it is present. If shutters follow different
+    motions, a pixel sees a frame in several places; these are averaged with the shutters' weights.
 
     Args:
         combine: How frames are combined.
         state, coefficients, present, moves: As for `compose`.
-        looks_at: Returns the frame of an index, as seen by each of `_motions`.
+        looks_at: Returns, for the index of a frame, the frame as seen with each of the motions of `_motions`.
     """
     options, bars = state.options, state.bars
     if moves is not None and options.interpolation == "value":
@@ -305,10 +320,13 @@ def _samples(
 
 
 def _motions(state: FrameState, coefficients: np.ndarray, moves: Moves | None) -> list[Moves | None]:
-    """Return the motions by which pixels see L frames: a list of (turns, shifts), or [None] if nothing is followed.
+    """Return the motions with which pixels see the L frames: (turns, shifts) each, or [None] without motions.
 
-    With value interpolation there is a motion (L, 1, 1) for each shutter. Otherwise there is one (L, H, W), which mixes
-    the motions of the shutters in each pixel.
+    With value interpolation there is one motion for each shutter, the same for all pixels: both arrays (L, 1, 1).
+    Otherwise there is a single motion, both arrays (L, H, W), which mixes the motions of the shutters in each pixel.
+
+    Args:
+        state, coefficients, moves: As for `compose`.
     """
     if moves is None:
         return [None]
@@ -319,9 +337,12 @@ def _motions(state: FrameState, coefficients: np.ndarray, moves: Moves | None) -
 
 
 def _exposed(state: FrameState, coefficients: np.ndarray, present: np.ndarray, moves: Moves | None) -> np.ndarray:
-    """Return the weights (M, H, W, L) with which frames are summed, for each of the M motions by which pixels see them.
+    """Return the weights (M, H, W, L) with which the average of frames is made, for each of M motions.
 
-    Arguments as for `compose`.
+    M is the number of motions from `_motions`, in the same order. The weights of a pixel add up to 1 over M and L.
+
+    Args:
+        state, coefficients, present, moves: As for `compose`.
     """
     normalised = state.bars / state.bars.sum(axis=1, keepdims=True)
     if moves is not None and state.options.interpolation == "value":
@@ -332,15 +353,13 @@ def _exposed(state: FrameState, coefficients: np.ndarray, present: np.ndarray, m
 
 
 def seen(frame: np.ndarray, places: np.ndarray, *, sharp: bool) -> np.ndarray:
-    """Sample a frame (H, W, C) at places (…), x + iy in pixels as in motions.Similarity. Return the samples (…, C).
-
-    Beyond its edges the frame repeats its last pixels.
+    """Sample a frame at places between pixels. Return the samples (…, C).
 
     Args:
-        frame: The frame.
-        places: The places.
-        sharp: By Catmull-Rom's cubic, clamped to the four pixels around to avoid ringing. Otherwise linearly, as
-            colours with alpha need.
+        frame: The frame (H, W, C). Beyond its edges the last pixels are repeated.
+        places: The places (…), complex numbers x + iy in pixels, y down, as in motions.Similarity.
+        sharp: Whether to use a Catmull-Rom cubic, limited to the range of the four nearest pixels, so that it does not
+            ring. Otherwise linear interpolation is used, as colours with alpha need.
     """
     height, width = frame.shape[:2]
     # Far outside everything is the same, and large numbers have no fractions.
@@ -357,11 +376,14 @@ def seen(frame: np.ndarray, places: np.ndarray, *, sharp: bool) -> np.ndarray:
 
 
 def _weights(t: np.ndarray, sharp: bool) -> dict[int, np.ndarray]:
-    """Return the weights of the pixels around a place, by their distance: −1, 0, 1 and 2 (sharp), or 0 and 1.
+    """Return the weights with which pixels along one axis contribute to a sample between them.
 
     Args:
-        t: How far the place is beyond pixel 0 towards pixel 1, 0 to 1, for any number of places.
+        t: The sample's distance from pixel 0 towards pixel 1, 0 to 1; an array of any shape.
         sharp: As for `seen`.
+
+    Returns:
+        {pixel: weights, like `t`} for the pixels −1, 0, 1 and 2 if sharp, else 0 and 1.
     """
     if not sharp:
         return {0: 1 - t, 1: t}
@@ -374,12 +396,13 @@ def _weights(t: np.ndarray, sharp: bool) -> dict[int, np.ndarray]:
 
 
 def _without_absent(q: np.ndarray, parts: np.ndarray, present: np.ndarray) -> np.ndarray:
-    """Return weights (M, H, W, L) in which the share of absent frames has gone to the present ones.
+    """Return weights (M, H, W, L) that are 0 for absent frames. Their share goes to the present ones, in proportion.
 
     Args:
-        q: The weights of all frames, (M, H, W, L).
-        parts: (M, H, W), what the nearest present frame gets if none has a share.
-        present: (L,) bool.
+        q: The weights of all frames, (M, H, W, L), for M motions. They add up to 1 over M and L.
+        parts: How M motions share the light, (M, H, W), with the sum 1. It is used where no present frame has a weight:
+            then the frame nearest to the exposure's middle gets these weights.
+        present: (L,) bool, False for absent frames.
     """
     if present.all():
         return q

@@ -19,12 +19,13 @@ STEPS = 1 << 10
 
 
 def resistances(guide: np.ndarray, strength: float) -> np.ndarray:
-    """Return the resistances (h, w) float32 of a guide's cells, from 1 to 1 / FLOOR.
+    """Return how strongly each cell of a guide resists diffusion, (h, w) float32 from 1 (flat) to 1 / FLOOR (edge).
 
     Args:
-        guide: (h, w, 3 or more), finite: display colours, 0 … 1, times the rows of cells over 240 (compute/guide.py);
-            three channels count.
-        strength: 0 … 1, how strictly scribbles stop at edges; 0 gives 1 everywhere, 1 the full contrast.
+        guide: The picture at whose edges scribbles stop, (h, w, 3 or more), finite: display colours 0 … 1, scaled by
+            the number of cells along the picture's shorter side / 240 (compute/guide.py). The first three channels
+            count.
+        strength: 0 … 1, how strictly scribbles stop at edges; 0 gives 1 everywhere.
     """
     colours = np.pad(np.asarray(guide)[..., :3].astype(np.float32), ((1, 1), (1, 1), (0, 0)), mode="edge")
     across, down = colours[1:-1, 2:] - colours[1:-1, :-2], colours[2:, 1:-1] - colours[:-2, 1:-1]
@@ -62,14 +63,15 @@ def of_pixels(cells: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
 
 
 def conductances(guide: np.ndarray, strength: float, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-    """Return how freely coefficients spread (conductances) from each pixel to the right and to the one below.
+    """Return how freely coefficients spread between neighbouring pixels (conductances), float64 from FLOOR to 1.
 
     Args:
         guide, strength: As for `resistances`.
-        shape: The picture's (h, w) pixels; a cell of the guide is one pixel, or 2 × 2, 4 × 4, …
+        shape: The picture's (h, w) pixels; a cell of the guide is a square of 1, 2, 4 … pixels a side.
 
     Returns:
-        (h, w − 1) and (h − 1, w) float64, from FLOOR to 1.
+        Two arrays: between each pixel and its right neighbour, (h, w − 1), and between each pixel and the one below it,
+        (h − 1, w).
     """
     pixels = of_pixels(resistances(guide, strength).astype(np.float64), shape)
     return 2 / (pixels[:, 1:] + pixels[:, :-1]), 2 / (pixels[1:] + pixels[:-1])

@@ -49,12 +49,15 @@ def behind(mattes: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def with_plate(sums: np.ndarray, clear: np.ndarray, plate: np.ndarray | None) -> np.ndarray:
-    """Return the background B (H, W, 4), filled by a plate where too little of it was exposed.
+    """Return the background's picture B (H, W, 4), filled by a plate where too little of the exposure shows it.
+
+    The sum of shares is raised to CLEAR with the plate. Where the background's share is at least CLEAR, the plate does
+    not count.
 
     Args:
-        sums: Σ qₖ hₖ Vₖ, (H, W, 4).
-        clear: Σ qₖ hₖ, (H, W): the share of the exposure that shows the background.
-        plate: (H, W, 4), what fills in. None: nothing does.
+        sums: Σ qₖ hₖ Vₖ, the exposed background's light, (H, W, 4).
+        clear: Σ qₖ hₖ, (H, W): the share of the exposure that shows the background, 0 to 1.
+        plate: The picture that fills in, (H, W, 4). None: nothing does, and B is the light divided by the share.
     """
     if plate is None:
         return sums / np.maximum(clear, 1e-6)[..., None]
@@ -63,14 +66,18 @@ def with_plate(sums: np.ndarray, clear: np.ndarray, plate: np.ndarray | None) ->
 
 
 def separated(colors: np.ndarray, matte: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Separate the colours of a subject and of its background in the mixed pixels at the subject's edge.
+    """Separate the colours of a subject from those of its background in pixels that mix both.
+
+    A mixed pixel at the subject's edge is m · subject + (1 − m) · background, with m its matte value. Both colours are
+    estimated from the surroundings.
 
     Args:
-        colors: (H, W, C) float32, linear light.
-        matte: (H, W), the subject's, 0 to 1. Pixels where it is neither 0 nor 1 are mixed.
+        colors: The picture (H, W, C) float32, linear light.
+        matte: The subject's matte (H, W), 0 to 1. Pixels where it is neither 0 nor 1 are mixed.
 
     Returns:
-        The subject's colours and the background's, (H, W, C) float32. Outside of mixed pixels they are the given ones.
+        The subject's colours and the background's, (H, W, C) float32 each. In pixels that are not mixed, both are the
+        colours given.
     """
     own, behind = colors.copy(), colors.copy()
     mixed = (matte > 0) & (matte < 1)
