@@ -29,12 +29,17 @@ _WHITE = 65535
 
 
 def guiding(index: int, step: int, shot: range) -> tuple[int, ...]:
-    """Return the source frames that make the guide of a shown frame: that one, then the filmed ones around it.
+    """Return the source frames from whose mean the guide of a shown frame is made.
+
+    The guide is the picture at whose edges scribbles stop.
 
     Args:
-        index: The shown source frame.
-        step: Every step-th frame was filmed.
-        shot: The source frames of its shot; others do not count.
+        index: The shown source frame, filmed or computed.
+        step: Every step-th source frame was filmed; the others are computed between two filmed ones.
+        shot: The source frames of the shown frame's shot. Frames outside it are left out.
+
+    Returns:
+        `index` first, then all other filmed frames at most BESIDE · step source frames away, in ascending order.
     """
     near = range(max(index - reach(step), shot.start), min(index + reach(step) + 1, shot.stop))
     return index, *(i for i in near if i % step == 0 and i != index)
@@ -46,7 +51,9 @@ def reach(step: int) -> int:
 
 
 def cell_of(short: int) -> int:
-    """Return the side of a guide's cells in pixels.
+    """Return the side in pixels of the squares, called cells, to which a frame is reduced for guides.
+
+    It is the largest power of two that leaves at least REDUCED cells along the picture's shorter side, or else 1.
 
     Args:
         short: The picture's shorter side in pixels.
@@ -55,7 +62,10 @@ def cell_of(short: int) -> int:
 
 
 class Guides:
-    """Makes the guides of a source's frames. Each is read and reduced once, until `keep` drops it."""
+    """Makes the guides of a source's frames: pictures at whose edges scribbles stop.
+
+    Each source frame is read and reduced once. The reduced copy stays in memory until a call of `keep` leaves it out.
+    """
 
     def __init__(self, source: FrameSource) -> None:
         self._source = source
@@ -82,12 +92,19 @@ class Guides:
         return set(frames).difference(self._reduced)
 
     def guide(self, frames: tuple[int, ...], block: int) -> np.ndarray:
-        """Return a guide (h, w, 3) float32: display values 0 … 1, times the rows of its cells over ROWS.
+        """Return a guide, (h, w, 3) float32. The last one is cached.
+
+        A cell of the guide is a square of pixels: a block, or a square of `cell_of` pixels a side if that is larger,
+        since the guide has no finer detail. h and w are the picture's size in cells, rounded up. The values are display
+        values, 0 … 1, times the number of cells along the picture's shorter side, over ROWS. So an edge has a similar
+        slope per cell in pictures of all sizes.
 
         Args:
-            frames: From `guiding`. Any but the first are skipped if they cannot be read.
-            block: The side in pixels of the blocks that share coefficients. In a large frame, cells are larger, since
-                the guide has no finer detail.
+            frames: The source frames from `guiding`, the shown one first. Others that cannot be read are left out.
+            block: The side in pixels of the blocks that share coefficients, a power of two.
+
+        Raises:
+            UserError: The shown frame cannot be read.
         """
         return self._made.get((frames, block), lambda: self._guide(frames, block))
 
@@ -116,7 +133,7 @@ class Guides:
 
 
 class NotedSource(SourceWrapper):
-    """A source around another one that also hands every frame that is read to Guides, which then need not read it."""
+    """A wrapper of a source that passes each frame it returns to Guides, which then need not read that frame again."""
 
     def __init__(self, source: FrameSource, guides: Guides) -> None:
         super().__init__(source)
@@ -135,9 +152,14 @@ class NotedSource(SourceWrapper):
 
 
 def _averaged(picture: np.ndarray, size: int) -> np.ndarray:
-    """Return means (h, w, 3), 0 … 1, over squares of size × size pixels of a picture (H, W, 3 or 4).
+    """Return the mean colors of squares of size × size pixels, (⌈H/size⌉, ⌈W/size⌉, 3) float32.
 
-    The last pixels are repeated at the edges.
+    Where a square reaches beyond the picture, the picture's last pixels are repeated.
+
+    Args:
+        picture: (H, W, 3 or 4); a fourth channel is ignored. Values of an integer type are divided by the type's
+            maximum, so that the means are 0 … 1. Floats keep their scale.
+        size: The side of a square in pixels.
     """
     whole = picture.dtype.kind == "u"
     unit = np.float32(size * size * (np.iinfo(picture.dtype).max if whole else 1))
@@ -153,11 +175,14 @@ def _gaussian(sigma: float) -> np.ndarray:
 
 
 def _steadied(shown: np.ndarray, beside: list[np.ndarray]) -> np.ndarray:
-    """Return the mean (3, h, w) float32 of a picture and others, which count at each pixel by their likeness to it.
+    """Return a weighted mean of the shown frame and its neighbors, which removes noise: (3, h, w) float32, 0 … 65,535.
+
+    The shown frame has weight 1. At each pixel, a neighbor's weight falls from 1, where it equals the shown frame, to
+    0, where any channel differs by ALIKE of the full range or more. So things that move stay as in the shown frame.
 
     Args:
-        shown: The picture of the shown frame, (3, h, w) uint16.
-        beside: Those of the frames around it.
+        shown: The reduced shown frame, (3, h, w) uint16.
+        beside: The reduced neighboring frames, each of the same shape and type; may be empty.
     """
     total, weights = shown.astype(np.float32), np.ones(shown.shape[1:], np.float32)
     for other in beside:

@@ -28,7 +28,12 @@ LARGEST = np.finfo(np.float32).max  # the most light
 
 
 class RecentFrames(SourceWrapper):
-    """A source around another one that caches the last frames, since each layer's window reads all of them."""
+    """A wrapper of a source that caches the frames that were read last.
+
+    It caches as many as fit into RECENT_BYTES, but at least eight.
+
+    Each layer has a window of its own, and all windows read the same frames one after another.
+    """
 
     windows = 1
 
@@ -52,15 +57,20 @@ class RecentFrames(SourceWrapper):
 
 
 class WeightedFrames(SourceWrapper):
-    """A source of frames in linear light, premultiplied with weights: a layer's matte, or what all mattes leave.
+    """A source whose frames are those of another one times weights, in linear light: what a layer's window reads.
+
+    For a layer, the weights are its matte. For the background, they are the share of it that all layers leave visible.
+    Opaque 8-bit frames become half floats, all others float32.
 
     Attributes:
-        base: The source of the frames. Opaque 8-bit frames become half floats, all others float32.
-        weight: Returns a frame's weights (H, W) float32, 0 … 1.
-        rest: Whether the weights are what layers leave; running sums then hold what layers take.
-        alone: Whether only the weights are wanted, as alpha.
-        colored: With `alone`, whether the frames' colors are needed all the same, by a threshold.
-        is_summable: Whether running sums can be made of them (running_sums.WeightedSums).
+        base: The other source.
+        weight: Takes a source frame's index, and returns its weights (H, W) float32, 0 … 1.
+        rest: Whether this is the background. Its running sums then hold 1 − weight, not the weight.
+        alone: Whether a frame's alpha is to be the weight alone, without the alpha of `base`. Colors are then 0, unless
+            `colored`.
+        colored: Whether colors are needed even with `alone`: a threshold chooses pixels by them.
+        is_summable: Whether running sums of the frames can be made (running_sums.WeightedSums): `base` is opaque and
+            8-bit, and `alone` is False.
     """
 
     alpha, transfer = "premultiplied", "linear"
@@ -104,13 +114,13 @@ def linear(frame: np.ndarray, source: FrameSource) -> np.ndarray:
 
 
 def with_colors(frame: np.ndarray, colors: np.ndarray, where: np.ndarray, source: FrameSource) -> np.ndarray:
-    """Return an opaque source's frame (H, W, 4) with the colors of some pixels replaced.
+    """Return a copy of an opaque source's frame (H, W, 4) in which some pixels have other colors.
 
     Args:
-        frame: (H, W, 4), in the source's samples.
-        colors: The new colors (H, W, 3), in linear light.
-        where: Which pixels get them, (H, W) bool.
-        source: The frame's source.
+        frame: The frame (H, W, 4), in the sample type and transfer of `source`.
+        colors: The new colors (H, W, 3), in linear light. They are converted to the frame's transfer and type.
+        where: Which pixels get the new colors, (H, W) bool.
+        source: The source of the frame.
     """
     result, own = frame.copy(), colors[where]
     own = light.to_encoded(own) if source.transfer == "srgb" else own
@@ -122,12 +132,13 @@ def with_colors(frame: np.ndarray, colors: np.ndarray, where: np.ndarray, source
 
 
 class LayerMattes:
-    """Makes the mattes of layers in source frames, and caches them.
+    """Makes the mattes of layers in source frames, and caches the last ones.
 
     Args:
         source: The footage.
-        solve: Returns the coefficients (N, h, w) float32 of a state (Layers.scribbles) at a source frame.
-        reader: Reads the values of mattes. None: all layers are drawn with strokes.
+        solve: Takes a state from Layers.scribbles and a source frame. Returns the coefficients (N, h, w) float32 that
+            spread from the strokes of drawn layers: 1 + i for layer i, and 0 for what belongs to no layer.
+        reader: Reads the values of the mattes of other layers. None: all layers are drawn with strokes.
     """
 
     def __init__(
@@ -147,10 +158,10 @@ class LayerMattes:
         return self._whole(layers, frame, layer) * np.float32(layers.opacities[layer])
 
     def edges(self, layers: Layers, frame: int) -> list[np.ndarray]:
-        """Return the mattes (H, W) float32 at whose soft edges the picture's pixels mix a subject and its background.
+        """Return a matte (H, W) float32, 0 … 1, for each layer: at its soft edges, colors have to be separated.
 
-        They are without opacities. Soft edges of ramps and of drawn layers are not in the picture itself: their mattes
-        are 0.
+        There, a pixel of the picture mixes a subject with its background. Opacities are not applied. The soft edges of
+        ramps and of drawn layers are not in the picture itself, so these layers get a matte of zeros.
 
         Args:
             layers: The layers.
@@ -196,10 +207,14 @@ class LayerMattes:
         return layering.behind(self.of(layers, frame))
 
     def _drawn(self, state: FrameState, frame: int, layer: int) -> np.ndarray:
-        """Return the matte of a layer of strokes. Unless it follows edges, it does not depend on the frame's picture.
+        """Return the matte of a layer that is drawn with strokes, (H, W) uint16: 65,535 for 1. It is cached.
+
+        The cached matte serves every source frame with the same strokes, unless these stop at edges of the frame's
+        picture (Options.edge_aware).
 
         Args:
-            state: The frame's state in Layers.scribbles.
+            state: The item of Layers.scribbles for the source frame. Its diffusion gives the mattes of all drawn
+                layers.
             frame: The source frame.
             layer: The layer's index.
         """
@@ -254,12 +269,15 @@ OPEN, TAKEN, FILLED = 0, 1, 2
 
 
 class LayerColors:
-    """Gives the frames of the footage with the colors of a layer or of the background, and their weights.
+    """Makes the frames and weights from which the windows of layers and of the background are loaded.
 
-    Frames have the source's samples. A layer is named by its index, and the background behind all layers by −1.
+    Colors can differ from the footage: at soft edges they are separated (*Clean Edges*), and behind layers the
+    background can come from other frames. Frames keep the sample type and transfer of the source. In all methods, a
+    layer is given by its index, and the background behind all layers by −1. Call `begin` for each picture before any
+    other method.
 
     Attributes:
-        layers: The layers of the last `begin`.
+        layers: The layers from the last call of `begin`.
     """
 
     layers: Layers
@@ -271,12 +289,12 @@ class LayerColors:
         self._kept: RecentValues[tuple, Any] = RecentValues()
 
     def begin(self, layers: Layers, options: Options, shot: range) -> None:
-        """Set what the next frames depend on.
+        """Set the layers, options and shot that all other methods use from now on, and drop cached frames.
 
         Args:
             layers: The layers.
-            options: The options of the state.
-            shot: The source frames that may show the background.
+            options: FrameState.options of the picture.
+            shot: The source frames of the picture's shot. Only these are searched for the background.
         """
         self.layers, self._options, self._shot = layers, options, shot
         self._kept.clear()
@@ -332,9 +350,15 @@ class LayerColors:
         return pair.moment(moment.pair, moment.number, moment.steps)
 
     def _separated(self, frame: int, layer: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return a frame (H, W, 4) with a layer's colors, and one with the colors of what lies behind it, cached.
+        """Separate the colors of a subject and of what lies behind it at soft edges in a source frame. Cached.
 
-        For −1 these are all layers together, and the background.
+        Args:
+            frame: The source frame.
+            layer: The index of the layer that is the subject. −1: all layers together are.
+
+        Returns:
+            The frame (H, W, 4) with the subject's colors in mixed pixels, and the frame with the colors of what lies
+            behind.
         """
         number = 0 if len(self.layers.shutters) == 1 else layer  # a single layer has all behind it
         return self._memo(frame, number, lambda: self._separate(frame, number))
@@ -353,10 +377,17 @@ class LayerColors:
         return self._memo(frame, "behind", lambda: self._uncover(frame))
 
     def _uncover(self, frame: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return a frame (H, W, 4) of the background, completed where layers cover it, and its weights (H, W).
+        """Make the background of a source frame, completed from other frames where layers cover it.
 
-        What layers cover comes from other frames, moved by the camera: where it pans, the frames that show a place are
-        no fair sample of the exposure.
+        The other frames are moved by the camera's motion. This matters if the camera pans: a place is then seen only in
+        some of the exposed frames, and these alone would not give the right mean over the exposure.
+
+        Args:
+            frame: The source frame.
+
+        Returns:
+            The frame (H, W, 4) in the source's samples, and the weight (H, W) float32, 0 … 1, with which each pixel
+            counts in the background's exposure (`uncovered`).
         """
         picture = self._separated(frame, -1)[1] if self._separates else as_rgba(self._source.decoded(frame))
         seen = self._mattes.behind(self.layers, frame)
@@ -384,14 +415,15 @@ class LayerColors:
 
 
 def nearest_frames(index: int, options: Options, shot: range) -> Iterable[int]:
-    """Return the filmed frames that a plate is made from, in the order in which it tries them.
+    """Return the filmed frames that `plate` searches for the background, in the order in which it tries them.
 
-    The nearest come first, of two the earlier one. Moments between them are made of these.
+    The nearest frame comes first, which can be `index` itself. Of two equally near ones, the earlier comes first.
+    Computed frames are left out, since they are made from the filmed frames beside them.
 
     Args:
-        index: The source frame for which the plate is.
-        options: Of the state; plate_reach sets how far frames may be.
-        shot: The source frames of the shot.
+        index: The source frame whose background is sought.
+        options: FrameState.options. Filmed frames at most plate_reach · step source frames from `index` are searched.
+        shot: The source frames of the shot; no frame outside it is returned.
     """
     reach = options.plate_reach * options.step
     near = range(max(index - reach, shot.start), min(index + reach + 1, shot.stop))
@@ -406,18 +438,23 @@ def plate(
     clear: Callable[[int], np.ndarray],
     motion: Callable[[int], tuple[complex, complex]],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Find out what lies behind layers in some pixels, the holes: take it from frames that show it there.
+    """Find what lies behind layers in the holes of a picture, by looking at the same places in other frames.
+
+    A hole is filled from the first of the frames that shows at least SEEN of the background at its place.
 
     Args:
-        holes: The pixels, (H, W) bool.
+        holes: Which pixels to fill, (H, W) bool.
         frames: Source frames, in the order in which they are tried.
-        read: Returns rows and columns of a frame in linear light, premultiplied.
-        clear: Returns how much (H, W) of the background a frame shows.
-        motion: Returns where a point z of this picture lies in a frame, as (turn, shift): at turn · z + shift.
+        read: Takes a source frame, and a slice of rows and one of columns. Returns that part of the frame (h, w, 4), in
+            linear light and premultiplied.
+        clear: Takes a source frame. Returns which share of the background it shows at each pixel, (H, W), 0 … 1.
+        motion: Takes a source frame. Returns (turn, shift): a point z = x + iy of the picture, in pixels, lies in that
+            frame at turn · z + shift.
 
     Returns:
-        A picture (H, W, 4) float32, scene-linear and premultiplied, and the kind (H, W) uint8 of each pixel: OPEN (no
-        hole), TAKEN from a frame, or FILLED, which is still to be filled.
+        The picture (H, W, 4) float32, in linear light and premultiplied, which is 0 in all pixels that are not TAKEN;
+        and the kind of each pixel, (H, W) uint8: OPEN, no hole; TAKEN, found in another frame; FILLED, a hole that no
+        frame shows, which the caller has to fill from its surroundings.
     """
     height, width = holes.shape
     picture, kinds = np.zeros((height, width, 4), np.float32), np.where(holes, FILLED, OPEN).astype(np.uint8)
@@ -441,16 +478,21 @@ def plate(
 
 
 def uncovered(colors: np.ndarray, seen: np.ndarray, plate: np.ndarray, kinds: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return the background in a frame, completed from a plate where layers cover it.
+    """Complete the background of a frame with a plate.
+
+    Where `kinds` is TAKEN, the color is the frame's by the share `seen`, and the plate's by the rest. Elsewhere it is
+    the frame's.
 
     Args:
-        colors: (H, W, 3), what the frame shows, scene-linear.
-        seen: (H, W), how much of the background it shows.
-        plate: The picture from `plate`, with holes where the frame does not show all.
-        kinds: The kinds of pixels from `plate`.
+        colors: The frame's colors (H, W, 3), in linear light.
+        seen: Which share of the background the frame shows at each pixel, (H, W), 0 … 1.
+        plate: The picture (H, W, 4) from the function `plate`, whose holes are pixels where layers cover the
+            background.
+        kinds: The kinds of pixels (H, W) from the same call.
 
     Returns:
-        Colors (H, W, 3), scene-linear, and their weights (H, W) float32.
+        The colors (H, W, 3), in linear light; and the weights (H, W) float32 with which they count in the exposure: a
+        little less than 1 where `kinds` is TAKEN, elsewhere `seen`.
     """
     taken = kinds == TAKEN
     mixed = seen[..., None] * colors + (1 - seen)[..., None] * plate[..., :3]
@@ -459,14 +501,17 @@ def uncovered(colors: np.ndarray, seen: np.ndarray, plate: np.ndarray, kinds: np
 
 
 def filled(picture: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Return a picture (H, W, C) whose unknown pixels are filled smoothly from their neighbors.
+    """Return a picture (H, W, C) whose unknown pixels are filled smoothly from the known ones around them.
 
-    It uses a pyramid: each level is the mean of the known pixels of the finer one, which takes from it what it lacks.
-    The result resembles diffusion, with one pass for each level.
+    The picture is halved again and again: a coarse pixel is the mean of the known ones among its four. Then, from
+    coarse to fine, unknown pixels are interpolated from the next coarser picture. The result resembles diffusion, but
+    is quicker.
+
+    If no pixel is known, all become 0. A picture that is one pixel wide or high is otherwise returned as it is.
 
     Args:
-        picture: (H, W, C) float32.
-        known: (H, W) bool.
+        picture: (H, W, C) float32. Values of unknown pixels do not matter.
+        known: Which pixels are known, (H, W) bool.
     """
     if known.all() or min(known.shape) < 2:
         return picture if known.any() else np.zeros_like(picture)

@@ -25,15 +25,18 @@ _SEEN = 1 / 1024
 
 
 class LayeredRenderer:
-    """Composes pictures with layers, and holds the windows and mattes of the layers.
+    """Composes pictures with layers: exposes each layer and the background separately, and lays them over one another.
+
+    It keeps their windows (the frames that can be exposed) and mattes for the next picture.
 
     Args:
-        compositor: Composes each layer and the background.
-        stages: Lays them over one another.
+        compositor: Exposes each layer and the background.
+        stages: Lays the exposed layers over the background.
         source: The footage.
-        guides: The guides of the diffusion, which get the frames that are read here.
-        mattes: Reads the values of mattes. None: all layers are drawn with strokes.
-        solve: Returns the coefficients (N, h, w) float32 of a state (Layers.scribbles) at a frame of a source.
+        guides: Makes the guides of the diffusion. Frames that are read for layers are passed to it.
+        mattes: Reads the values of layers' mattes. None: all layers are drawn with strokes.
+        solve: Takes a source, a state from Layers.scribbles and a source frame. Returns the coefficients (N, h, w)
+            float32 from which the mattes of drawn layers are made.
     """
 
     def __init__(
@@ -64,14 +67,16 @@ class LayeredRenderer:
     def draw(
         self, request: Request, behind: Request, coefficients: Coefficients, shot: range, plain: Callable[[], Handle]
     ) -> Handle:
-        """Return a picture with layers on the device, as Compositor.draw does.
+        """Return a picture with layers on the device, in the form of Compositor.draw.
 
         Args:
-            request: The picture.
-            behind: The request of the background, without layers.
-            coefficients: Those of `behind`.
-            shot: The source frames that windows may show.
-            plain: Returns the picture without layers, which counts where no layer is in any exposed frame.
+            request: The picture, whose state has layers.
+            behind: The request for the background: the same picture without layers.
+            coefficients: How much of each shutter a pixel of the background gets.
+            shot: The source frames of the shot, which windows may show.
+            plain: Composes the picture without layers. It is called only if the background is not composed from running
+                sums: then pixels where no layer is in any exposed frame are taken from that picture, since the
+                background's could differ slightly.
         """
         layers = request.state.layers
         assert layers is not None
@@ -94,14 +99,14 @@ class LayeredRenderer:
     def _composed(
         self, request: Request, parts: Parts, coefficients: Coefficients, shot: range, plain: Callable[[], Handle]
     ) -> Handle:
-        """Return the picture of `draw`, which calls this again with smaller windows if it fails.
+        """Compose the picture of `draw` once. `draw` calls this again, with smaller windows, if it fails.
 
         Args:
             request, coefficients, shot, plain: As for `draw`.
-            parts: The requests of the picture's parts.
+            parts: The requests of the picture's parts, from `_parts`.
 
         Raises:
-            ValueError: A window was freed to make room for others.
+            ValueError: The device freed one of the windows to make room for another.
         """
         count = max(layer for layer, _ in parts) + 1
         moves = any(part.state.following is not None for part in parts.values())
@@ -123,9 +128,16 @@ class LayeredRenderer:
         return self._stages.lay(bottom, exposed[1:], request.levels)
 
     def _parts(self, request: Request, behind: Request, layers: Layers) -> Parts:
-        """Return the requests of the parts of a picture: the background (−1) and each layer.
+        """Return a request for each part of a picture: for the background and for each layer.
 
-        If frames have alpha, each has a second part, whose alpha is its share of the exposure.
+        Keys are (layer's index or −1 for the background, False). If the source's frames have alpha, each part also has
+        a request with True: in its picture, alpha is the share of the exposure time in which the layer or the
+        background is visible, whatever the alpha of the frames.
+
+        Args:
+            request: The picture.
+            behind: The request for the background, as for `draw`.
+            layers: The layers.
         """
         states = [behind.state, *(request.state.of([shutter]) for shutter in layers.shutters)]
         parts = {(i, False): replace(behind, state=state) for i, state in enumerate(states, -1)}
@@ -136,12 +148,15 @@ class LayeredRenderer:
         return parts
 
     def _window(self, name: tuple[int, bool], part: Request, shutters: int) -> Handle:
-        """Return the window of a part, which is made or replaced if it does not fit.
+        """Return the window from which a part of a picture is composed.
+
+        The last window of the part is used again. If it was released, or if the part needs another kind of window
+        (other length, motion, mode, threshold or colors), a new one is made, and the part's old ones are released.
 
         Args:
-            name: The part, a key of Parts.
-            part: Its request.
-            shutters: The number of shutters of the picture.
+            name: The part's key in Parts.
+            part: The part's request.
+            shutters: The number of shutters of the whole picture, which tells how much memory other textures need.
         """
         (layer, alone), moved, options = name, part.state.following is not None, part.state.options
         summed = part.state.averages
@@ -186,16 +201,18 @@ class LayeredRenderer:
     def _plate(
         self, request: Request, exposed: list[Exposure], shot: range, gain: Callable[[], np.ndarray]
     ) -> np.ndarray | None:
-        """Return a picture (H, W, 4) of the background for where too little of it is exposed, if it is visible there.
+        """Make a picture of the background for pixels where it shows through the layers, but too little was exposed.
+
+        Holes are taken from other frames of the shot, and otherwise filled from their surroundings.
 
         Args:
             request: The picture.
-            exposed: The background, and the layers.
-            shot: The source frames that windows may show.
-            gain: Returns the brightness (H, W) of the background's pixels.
+            exposed: The exposed background, then the exposed layers.
+            shot: The source frames of the shot, which are searched.
+            gain: Returns the factor for the brightness of the background's pixels, (H, W), or (1, 1) for all.
 
         Returns:
-            Behind.plate; None if it is needed nowhere.
+            The plate (H, W, 4) for Behind.plate, in linear light. None: no pixel needs it.
         """
         layers, (bottom, *own) = request.state.layers, exposed
         if layers is None or self._stages.least_share(bottom) >= layering.CLEAR:

@@ -34,26 +34,27 @@ _AHEAD, _DECODED, _DECODED_BYTES = 4, 8, 256 << 20
 
 
 def open_compositor(device: str = "gpu") -> Compositor:
-    """Return what composes pictures, on a GPU or with NumPy.
+    """Open a device, and return the compositor that makes pictures on it.
 
     Args:
-        device: "gpu" (OpenGL 4.3) or "cpu" (NumPy).
+        device: "gpu" for a GPU with OpenGL 4.3, or "cpu" for NumPy.
 
     Raises:
-        NoDeviceError: There is no OpenGL 4.3, or no moderngl.
+        NoDeviceError: `device` is "gpu", but OpenGL 4.3 or the package moderngl is missing.
     """
     return CPUCompositor() if device == "cpu" else GPUCompositor(open_gl())
 
 
 def open_gl(budget: Budget | None = None, ask_others: Callable[[], None] | None = None) -> GLDevice:
-    """Return a device on a new OpenGL 4.3 context.
+    """Create an OpenGL 4.3 context, and return a device that computes on it.
 
     Args:
-        budget: The memory that it shares with other devices on the GPU. None: one of its own.
-        ask_others: Called when the budget is full; makes other devices free memory.
+        budget: The memory that this device shares with others on the same GPU. None: it gets a budget of its own.
+        ask_others: A function that makes other devices free memory, called when the budget is used up. None: none is
+            called.
 
     Raises:
-        NoDeviceError: OpenGL 4.3 or moderngl is missing.
+        NoDeviceError: OpenGL 4.3 or the package moderngl is missing.
     """
     try:
         from .devices.gl import GLDevice
@@ -63,14 +64,17 @@ def open_gl(budget: Budget | None = None, ask_others: Callable[[], None] | None 
 
 
 class LabelLayer(NamedTuple):
-    """Labels from which a share of a picture's coefficients is diffused. Opacities of scribbles need several of these.
+    """One set of labels (which shutter is drawn where). A weighted mean over several sets gives the coefficients.
+
+    Each set is diffused by itself. If no scribble has an opacity between 0 and 1, one set suffices (scribbles.layers).
 
     Attributes:
-        share: The share, 0 to 1; those of all LabelLayers sum to 1 (scribbles.layers).
+        share: The weight of this set, more than 0 and at most 1. The weights of a picture's sets sum to 1.
         labels: (h, w) uint16, one for each block of Options.aggregate pixels a side: 0 where nothing is drawn, 1 +
-            shutter where that shutter is drawn.
-        sole: The index of the shutter that all pixels get, if there is only one. None: there are several.
-        key: A hashable value that is equal for equal labels and shares.
+            index of the shutter that is drawn.
+        sole: The index of the shutter that all pixels get from this set, since no other is drawn in it: 0 if nothing is
+            drawn. None: several are drawn.
+        key: A hashable value that is equal for equal labels and weights.
     """
 
     share: float
@@ -80,13 +84,16 @@ class LabelLayer(NamedTuple):
 
 
 class Renderer:
-    """Renders pictures of a source. For the next picture, it keeps the window's frames and each stage's last result.
+    """Renders pictures of one source.
+
+    For the next picture, it keeps the frames in its window, and the last result of each stage: labels, coefficients,
+    picture.
 
     Attributes:
-        compositor: Composes the pictures.
+        compositor: Composes the pictures, on a GPU or with NumPy.
         source: The footage.
-        is_short: Whether the device had no room for the last window, so that each picture sends all frames, which is
-            slow.
+        is_short: Whether the device lacks memory for the window, so that every picture sends all its frames again,
+            which is slow.
     """
 
     def __init__(self, compositor: Compositor, source: FrameSource, mattes: MatteReader | None = None) -> None:
@@ -104,10 +111,11 @@ class Renderer:
         self._kept_picture: LastValue[Handle] = LastValue()
 
     def picture(self, request: Request) -> np.ndarray:
-        """Return the picture (H, W, 4) of a request, top row first: scene-linear float32, premultiplied.
+        """Return the picture of a request as an array (H, W, 4), top row first.
 
-        If request.levels is true, it is 8-bit sRGB over black with full alpha, as in a movie with Blender's view
-        transform Standard. If the request has a display, it is that display's levels.
+        By default it is scene-linear float32, premultiplied. With request.levels it is uint8: sRGB values over black
+        with full alpha, as in a movie with Blender's view transform Standard. With request.display it is uint8, too:
+        the values that this display shows.
         """
         with self.compositor.current():
             if request.display is not None:
@@ -117,9 +125,10 @@ class Renderer:
             return self.compositor.read(self.draw(request))
 
     def draw(self, request: Request) -> Handle:
-        """Return the picture of a request on the device (GPUCompositor.draw), or with NumPy as an array.
+        """Return the picture of a request on the device: a texture as from GPUCompositor.draw, or an array with NumPy.
 
-        It is valid until the renderer's next picture. The same picture is not composed again.
+        It is valid until the renderer makes another picture. If the last picture was for an equal request, that one is
+        returned.
         """
         if request.state.layers is None and (self._window is None or not self._window.is_open):
             self._kept_picture.clear()
@@ -160,13 +169,13 @@ class Renderer:
         return self._layered
 
     def _solved_apart(self, source: FrameSource, state: FrameState, index: int) -> np.ndarray:
-        """Return the coefficients (N, h, w) float32 from which the mattes of drawn layers are made.
+        """Return the coefficients (N, h, w) float32 from which LayerMattes makes the mattes of drawn layers.
 
-        A second renderer solves for them, so that this one keeps its own results.
+        A second renderer computes them, so that this one keeps its own labels and coefficients.
 
         Args:
-            source: The footage.
-            state: A state of Layers.scribbles.
+            source: The footage. Only the first call's counts.
+            state: The item of Layers.scribbles for the source frame.
             index: The source frame.
         """
         if self._scribbles is None:
@@ -174,9 +183,9 @@ class Renderer:
         return self._scribbles.coefficients(Request(index, state))
 
     def coefficients(self, request: Request) -> np.ndarray:
-        """Return how much of each shutter a pixel gets, without layers: (N, h, w) float32.
+        """Return how much of each shutter a pixel gets, by strokes and mattes but not by layers: (N, h, w) float32.
 
-        There is a value for each block of Options.aggregate pixels a side.
+        There is one value for each block of Options.aggregate pixels a side; h and w are from `grid`.
         """
         self._want(request)  # the picture will read these frames as well
         count, (width, height) = len(request.state.bars), grid(self.source, request.state)
@@ -194,9 +203,10 @@ class Renderer:
             return self._coefficients(request, labels, len(request.state.bars))
 
     def coefficients_with_layers(self, request: Request) -> np.ndarray:
-        """Return how much of each shutter a pixel gets: (N, H, W) float32, with the mattes of layers laid over.
+        """Return how much of each of the N shutters a pixel gets, including layers: (N, H, W) float32, at each pixel.
 
-        Each layer counts with its shutter.
+        Where a layer's matte is m, the layer's shutter gets m, and what lies beneath keeps 1 − m. A pixel's values sum
+        to 1.
         """
         block = request.state.options.aggregate
         whole = self.coefficients(request).repeat(block, 1).repeat(block, 2)
@@ -220,10 +230,14 @@ class Renderer:
             return Coefficients(self._stages.upload(values), 1)
 
     def drawn_labels(self, request: Request) -> tuple[Handle, int]:
-        """Return which shutter is drawn on which pixel (labels), as a GPU texture for the preview, and their block.
+        """Return which shutter is drawn where, for the preview of scribbles.
 
-        The texture array is r32ui, top row first, and valid until the next call of any method. One label is for block ×
-        block pixels.
+        Scribbles of all opacities above 0 count alike.
+
+        Returns:
+            The labels on the device (on a GPU a texture array r32ui, top row first): 0 where nothing is drawn, 1 +
+            index of the shutter that is drawn. They are valid until the next call of any method. Then the side in
+            pixels of the block that shares a label.
         """
         with self.compositor.current():
             return self.compositor.labels(self.labels(request)[0].labels), request.state.options.aggregate
@@ -234,13 +248,14 @@ class Renderer:
         return self._kept_labels.get((size, state.options.border, state.shapes_key), lambda: labelled(state, size))
 
     def shot(self, request: Request, *, known: bool = False) -> range:
-        """Return the source frames that the window may show: those of the shot around the shown one.
+        """Return the source frames that the window may show: those between the cuts before and after the shown frame.
 
-        Cuts are looked for only as far as the window reaches. Beyond, the shot goes on to the clip's start or end.
+        Cuts are searched only as far as the picture needs frames. If none is found on one side, the range goes to the
+        clip's start or end there. Without Options.stop_at_cuts, or if the source has no cuts, it is the whole clip.
 
         Args:
             request: The picture.
-            known: Read no frame to look for cuts; only cuts that were found before count.
+            known: Use only cuts that were found before, and read no frame to find others.
         """
         index, (low, high), shots = request.index, self._reach(request), self.source.shots
         if shots is None or not request.state.options.stop_at_cuts:
@@ -258,10 +273,12 @@ class Renderer:
         return shot
 
     def slid(self, request: Request, *, known: bool = False) -> Request:
-        """Return the request with its exposures moved into the shot and edges "hold", if its edges are "slide".
+        """Return the request with exposures moved into the shot if Options.edges is "slide", else the request itself.
+
+        In the returned request, "slide" is replaced by "hold", for exposures that are longer than the shot.
 
         Args:
-            request: The request.
+            request: The picture.
             known: As for `shot`.
         """
         if request.state.options.edges != "slide":
@@ -288,11 +305,13 @@ class Renderer:
         return (missing | unread) - handed
 
     def layer_mattes(self, request: Request, frame: int | None = None) -> list[np.ndarray]:
-        """Return the mattes (H, W) float32 of a request's layers, times their opacities; none without layers.
+        """Return the matte of each layer of a request, (H, W) float32, 0 … 1, times the layer's opacity.
+
+        The list is empty if the request has no layers.
 
         Args:
-            request: The request.
-            frame: The source frame. None: the shown one.
+            request: The picture.
+            frame: The source frame in which the mattes are made. None: the shown frame of the request.
         """
         if request.state.layers is None:
             return []
@@ -300,10 +319,11 @@ class Renderer:
             return self._layering().mattes.of(request.state.layers, request.index if frame is None else frame)
 
     def _want(self, request: Request) -> list[int]:
-        """Have the source decode the frames that a picture lacks, then those of the next pictures.
+        """Announce to the source which frames this picture and the next few will read: it decodes them early.
 
         Returns:
-            The frames to announce once the picture is made; the others are on the device by then.
+            The frames that only the next pictures will read, in order. Announce these again once this picture is made:
+            its own frames are on the device by then.
         """
         indices = (request.index + step * request.direction * self.source.step for step in range(_AHEAD + 1))
         shown = (min(max(index, 0), self.source.count - 1) for index in indices)
@@ -319,9 +339,10 @@ class Renderer:
         return request.state.options.edge_aware > 0 and sole_of(self.labels(request)) is None
 
     def _reach(self, request: Request) -> tuple[int, int]:
-        """Return the lowest and highest position (windows.positions) that the picture needs.
+        """Return the lowest and the highest frame number that the picture needs, both included.
 
-        That is for exposures, for the shown frame, and for the frames that guide the diffusion.
+        The range covers the frames that are exposed, the shown frame, and the frames that guide the diffusion. It may
+        go beyond the footage's ends, as windows.positions do.
         """
         low, high = windows.reach(request.state, request.index, request.direction)
         beside = guide.reach(request.state.options.step) if self._is_guided(request) else 0
@@ -334,9 +355,14 @@ class Renderer:
         return guide.guiding(request.index, request.state.options.step, shot)
 
     def _exposing(self, request: Request, labels: list[LabelLayer]) -> Request:
-        """Return the request with only one shutter if all pixels get that one, else the request itself.
+        """Return a request for the only shutter of the picture if all pixels get the same one, else the request itself.
 
-        Frames that only other shutters would expose are then not read.
+        Frames that only the other shutters expose are then not read. In the new request this shutter has index 0, and
+        there are no scribbles. With any mattes, the request itself is returned.
+
+        Args:
+            request: The picture.
+            labels: The LabelLayers of the picture's scribbles.
         """
         sole = _sole(request, labels)
         return request if sole is None else replace(request, state=request.state.of([sole]))
@@ -357,11 +383,11 @@ class Renderer:
         return self._window
 
     def _kind_for(self, request: Request) -> tuple[int, bool, int, bool]:
-        """Return what kind of window a picture needs, as arguments of Compositor.window.
+        """Return what kind of window a picture needs: the arguments of Compositor.window after the source.
 
         Returns:
-            Its length in frames, whether exposures follow something, the number of shutters, and whether all of these
-            average frames, so that sums suffice.
+            The window's length in source frames; whether an exposure follows a motion; the number of shutters; and
+            whether all shutters that pixels get average their frames, so that running sums suffice.
         """
         exposing = self._exposing(request, self.labels(request)).state
         return request.state.options.window, exposing.following is not None, len(request.state.bars), exposing.averages
@@ -377,13 +403,14 @@ class Renderer:
             self._guides.keep(i for i in onwards if i % step == 0 or i == index)
 
     def _coefficients(self, request: Request, labels: list[LabelLayer], count: int = 1) -> Coefficients:
-        """Return how much of each shutter a pixel gets (coefficients), on the device, from strokes and mattes.
+        """Return how much of each shutter a pixel gets, from strokes and mattes, on the device.
 
         Args:
             request: The picture.
-            labels: Of its scribbles.
-            count: If all pixels get one shutter: the number of shutters among which it counts. 1: that one alone, as
-                for `_exposing`.
+            labels: The LabelLayers of the picture's scribbles.
+            count: The number of shutters in the result if all pixels get the same one. With 1, the result has only that
+                shutter, as the request from `_exposing` does. If pixels get different shutters, the result always has
+                all of them.
         """
         if (sole := _sole(request, labels)) is not None:
             return self._constant(np.eye(count)[sole if count > 1 else 0])
@@ -396,7 +423,11 @@ class Renderer:
     def _with_mattes(self, request: Request, labels: list[LabelLayer]) -> Handle:
         """Return how much of each shutter a pixel gets, from strokes with mattes laid over, on the device.
 
-        These coefficients are kept until either changes.
+        The result is cached until the mattes or the strokes' coefficients change.
+
+        Args:
+            request: The picture.
+            labels: The LabelLayers of the picture's scribbles.
         """
         state = request.state
         if not state.mattes or self._mattes is None:
@@ -411,10 +442,14 @@ class Renderer:
         return self._kept_mattes.get(key, lambda: self._stages.blend(beneath, state.mattes, values))
 
     def _diffused(self, request: Request, labels: list[LabelLayer]) -> Handle:
-        """Return how much of each shutter a pixel gets, as it spreads from drawn strokes, on the device.
+        """Return how much of each shutter a pixel gets as it spreads from strokes, without mattes, on the device.
 
-        These coefficients are kept until labels or guides change, or until a request that is not quick needs an exact
-        solution.
+        The result is cached until the labels, the guide's frames, its strength or the number of shutters change. A
+        result for a quick request may be approximate; it is replaced when a request that is not quick comes.
+
+        Args:
+            request: The picture.
+            labels: The LabelLayers of the picture's scribbles.
         """
         options, count = request.state.options, len(request.state.bars)
         frames = self._guiding(request, self.shot(request)) if options.edge_aware else ()
@@ -428,13 +463,14 @@ class Renderer:
         return self._kept_diffusion.get(key, solve, quick=request.quick)
 
     def _solved_layers(self, layers: list[LabelLayer], count: int, guided: tuple, quick: bool) -> Handle:
-        """Return the sum of the coefficients that are diffused from each LabelLayer, times its share.
+        """Return how much of each shutter a pixel gets, on the device: the mean over LabelLayers by their shares.
 
         Args:
-            layers: The LabelLayers.
+            layers: The LabelLayers, whose labels are diffused one by one.
             count: The number of shutters.
-            guided: The guide and its strength, or nothing.
-            quick: Whether the solve may start from the last solution. Several never do: one would start from another's.
+            guided: (guide, strength), if edges in the guide stop the diffusion. Else empty.
+            quick: Whether the diffusion may start from its last result, which is quicker and slightly inexact. With
+                more than one LabelLayer it never does, since the last result would be that of another one.
         """
         if len(layers) == 1:
             return self._stages.solve(layers[0].labels, count, *guided, warm=quick)
@@ -500,9 +536,14 @@ def labelled(state: FrameState, size: tuple[int, int]) -> list[LabelLayer]:
 
 
 def grid(source: FrameSource, state: FrameState) -> tuple[int, int]:
-    """Return the size (w, h) of the labels and coefficients for pictures of a source.
+    """Return the size (w, h) of the labels and coefficients of a picture.
 
-    There is one for each block of Options.aggregate pixels a side.
+    They have one value for each block of Options.aggregate × Options.aggregate pixels, also for a part of a block at
+    the right and bottom edge.
+
+    Args:
+        source: The footage.
+        state: The state of the picture.
     """
     block = state.options.aggregate
     return -(-source.width // block), -(-source.height // block)

@@ -23,14 +23,17 @@ class Request:
     """A request for one picture: everything that the picture depends on, as plain data.
 
     Attributes:
-        index: The shown source frame, from 0. With Smooth, each moment counts as a source frame.
-        state: The effect at that frame.
-        direction: 1, or −1 if the footage plays backward: the window's next frames are then those before `index`.
-        source: Names the footage and its size. A caller with several renderers chooses one by it.
-        levels: Whether the picture is in 8-bit sRGB values over black. Otherwise it is in scene-linear float32.
-        quick: Whether the diffusion may start from the last coefficients, on which the picture then depends slightly.
-        display: Converts the finished picture, opaque and scene-linear, to 8-bit values as Blender's output does.
-            `levels` is False then. None: the picture is not converted.
+        index: The number of the shown source frame, from 0. With Smooth, frames computed between filmed ones are
+            numbered, too.
+        state: The state of the effect at that frame.
+        direction: 1, or −1 if the footage plays backward. Later frames of the window then have lower numbers.
+        source: Any hashable value that stands for the footage and its size. A caller with several renderers finds the
+            right one by it; renderers only compare it.
+        levels: Whether the picture has 8-bit sRGB values, over black. Otherwise it is scene-linear float32.
+        quick: Whether the diffusion may start from its last result. It is then quicker, and the picture depends
+            slightly on the one before.
+        display: Converts the finished picture, which is opaque and scene-linear, to the 8-bit values of Blender's
+            output. `levels` must then be False. None: the picture is not converted.
     """
 
     index: int
@@ -47,13 +50,16 @@ class Request:
         return self.source, self.index, self.direction, self.state.key, self.levels, self.display
 
     def positions(self, shot: range) -> np.ndarray:
-        """Return the positions (core.model.windows.positions) of the frames that any shutter exposes.
+        """Return the frame numbers (n,) that any shutter exposes, in the window's order.
 
-        If frames of them are missing (edges "shorten"), return all positions of the window that have a frame, since the
-        nearest one may take their place.
+        They may lie beyond the footage's ends, as core.model.windows.positions do.
+
+        With edges "shorten", frames beyond the shot are left out. If the shutters would expose such a frame, the result
+        is all frame numbers of the window that lie in the shot, since the nearest frame may take the place of a missing
+        one.
 
         Args:
-            shot: The source frames that may be shown.
+            shot: The source frames of the shot.
         """
         within = windows.positions(self.state.options, self.index, self.direction)
         exposed = slice(*self.state.open_span)
@@ -72,7 +78,8 @@ class Coefficients(NamedTuple):
 
     Attributes:
         handle: On a GPU a texture array rgba32f, four shutters per layer, top row first; with NumPy an array (N, h, w).
-        block: The side of the blocks of pixels that share a value.
+        block: The side in pixels of the square blocks that share a value. For one value everywhere, it is at least as
+            large as the picture.
     """
 
     handle: Handle
@@ -80,11 +87,14 @@ class Coefficients(NamedTuple):
 
 
 class Exposure(NamedTuple):
-    """A composed layer, or the composed background behind all layers. For opaque frames, both pictures are the same.
+    """A layer, or the background behind all layers, exposed by itself.
+
+    For opaque footage, both attributes are the same picture.
 
     Attributes:
-        color: Its picture, premultiplied.
-        share: A picture whose alpha says how much of each pixel's exposure time the layer, or the background, fills.
+        color: The exposed picture, premultiplied, in linear light.
+        share: A picture whose alpha is the share of the exposure time in which the layer or the background is visible
+            at a pixel, whatever the alpha of the footage.
     """
 
     color: Handle
@@ -92,12 +102,14 @@ class Exposure(NamedTuple):
 
 
 class Behind(NamedTuple):
-    """The background behind all layers, for Stages.lay.
+    """The background behind all layers, and what replaces it in some pixels, for Stages.lay.
 
     Attributes:
-        exposed: The frames' background, composed with weights for what layers leave.
-        plain: The picture without layers. None: `exposed` has the same bits wherever no layer is.
-        plate: (H, W, 4), used where too little background was exposed. None: enough was exposed everywhere.
+        exposed: The exposed background: a sum of frames, each weighted by what layers leave visible in it.
+        plain: The picture without layers, which is shown at pixels where no layer is in any exposed frame. None: not
+            needed, `exposed` is used there, too.
+        plate: (H, W, 4), linear light, top row first: the background where the exposure shows too little of it. None:
+            it shows enough everywhere.
     """
 
     exposed: Exposure
@@ -112,13 +124,16 @@ class Stages(Protocol):
     """
 
     def solve(self, labels: np.ndarray, count: int, *guided: Any, warm: bool = False) -> Handle:
-        """Return how much of each shutter a pixel gets, as compute.diffusion.diffuse does, on the device.
+        """Spread shutters from labels to all pixels, and return how much of each shutter a pixel gets, on the device.
+
+        It solves the same equations as compute.diffusion.diffuse.
 
         Args:
-            labels: (h, w) uint16: 0 where nothing is drawn, 1 + shutter where that shutter is drawn.
+            labels: (h, w) uint16: 0 where nothing is drawn, 1 + index of the shutter that is drawn.
             count: The number of shutters.
-            guided: The guide whose edges stop the diffusion, and its strength, or nothing.
-            warm: Whether it may start from the last coefficients.
+            guided: Two arguments, if edges stop the spreading: the guide (from Guides.guide) and the strength, 0 to 1.
+                Else none.
+            warm: Whether it may start from the last result, which is quicker and slightly inexact.
         """
 
     def upload(self, values: np.ndarray) -> Handle:
@@ -129,12 +144,12 @@ class Stages(Protocol):
         """
 
     def add(self, mixed: Handle | None, added: Handle, share: float, size: tuple[int, int]) -> Handle:
-        """Add a share of some coefficients to a sum, and return the new sum on the device.
+        """Add coefficients, times a factor, to a sum of such products, and return the new sum on the device.
 
         Args:
-            mixed: The sum so far. None: start one.
-            added: The coefficients.
-            share: The share, 0 to 1.
+            mixed: The sum so far, from the last call. None: there is none yet, start with 0.
+            added: The coefficients to add, of the sum's size, or one set for all pixels.
+            share: The factor, 0 to 1.
             size: (h, w) of the sum.
         """
 
@@ -144,32 +159,33 @@ class Stages(Protocol):
         """Lay mattes over coefficients (core.model.mattes.blended), and return the new coefficients on the device.
 
         Args:
-            beneath: The coefficients: how much of each shutter a pixel gets.
-            mattes: The mattes.
-            layers: (key, values) of each matte: values (h, w) float32, and a key that is equal for equal values.
+            beneath: The coefficients beneath: how much of each shutter a pixel gets.
+            mattes: The mattes, the lowest first. They tell the shutter, opacity and kind of blending.
+            layers: (key, values) for each matte: values (h, w) float32, 0 to 1, without opacity; and a hashable key
+                that is equal for equal values, which are then not sent again.
         """
 
     def least_share(self, exposed: Exposure) -> float:
         """Return the lowest alpha of exposed.share, of any pixel. A low one tells that a plate has to be made."""
 
     def lay(self, behind: Behind, layers: Sequence[Exposure], levels: bool) -> Handle:
-        """Return the picture of layers laid over the background (core.pixels.layering), on the device.
+        """Lay exposed layers over the background (core.pixels.layering), and return the picture on the device.
 
         Args:
             behind: The background.
-            layers: The layers, the farthest first.
-            levels: As in Request.
+            layers: The exposed layers, the farthest first; at least one.
+            levels: Whether to return 8-bit sRGB values over black. Otherwise the picture is scene-linear float32.
         """
 
     def release(self) -> None: ...
 
 
 class Compositor(Protocol):
-    """Composes pictures, on a GPU or with NumPy.
+    """Exposes frames: combines those of a window by the shutters that each pixel gets, on a GPU or with NumPy.
 
     Attributes:
         name: The device's name.
-        takes_planes: Whether frames are fastest to send as planes (core.frames.frame_source).
+        takes_planes: Whether frames are sent fastest as planes of luma and chroma (frame_source.Planes), not as RGBA.
     """
 
     name: str
@@ -184,26 +200,29 @@ class Compositor(Protocol):
     def window(
         self, source: FrameSource, capacity: int, moved: bool = False, shutters: int = 4, summed: bool = True
     ) -> Handle:
-        """Return a new window, which holds the source frames that a picture exposes.
+        """Make an empty window: storage for the source frames that a picture exposes.
+
+        The arguments choose how frames are stored, and how much memory is left for other textures. With NumPy only
+        `source` counts.
 
         Args:
             source: The footage.
-            capacity: The most frames that it holds.
-            moved: Whether exposures of its pictures follow something (FrameState.following).
+            capacity: The most source frames that the window has to hold at once.
+            moved: Whether an exposure of its pictures follows a motion (FrameState.following).
             shutters: The number of shutters of its pictures.
-            summed: Whether all of them average frames.
+            summed: Whether all shutters average their frames, so that running sums suffice.
         """
 
     def stages(self) -> Stages: ...
 
     def labels(self, values: np.ndarray) -> Handle:
-        """Send labels to the device, and return them there, until the next call.
+        """Send labels to the device for the preview. The result is valid until the next call.
 
         Args:
-            values: (H, W) uint16: 0 where nothing is drawn, 1 + shutter where that shutter is drawn.
+            values: (h, w) uint16: 0 where nothing is drawn, 1 + index of the shutter that is drawn.
 
         Returns:
-            On a GPU a texture r32ui.
+            On a GPU a texture array r32ui, top row first. With NumPy `values`.
         """
 
     def coefficients(self, handle: Handle, count: int) -> np.ndarray:
@@ -224,11 +243,11 @@ class Compositor(Protocol):
         """Return the display's levels (H, W, 4) uint8 of a drawn, opaque, scene-linear picture, top row first."""
 
     def draw(self, window: Handle, request: Request, coefficients: Coefficients) -> Handle:
-        """Return a picture on the device, premultiplied.
+        """Expose a window's frames. Return the picture, premultiplied: on a GPU a texture, with NumPy an array.
 
         Args:
-            window: The window, which has loaded all exposed frames.
-            request: The picture.
+            window: The window. All frames that the picture exposes must be loaded in it.
+            request: The picture. Its layers, strokes and mattes are not looked at.
             coefficients: How much of each shutter a pixel gets.
         """
 

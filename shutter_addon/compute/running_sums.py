@@ -27,16 +27,22 @@ STORED_SUMS = ("rgba16ui", "rgba32ui", "rgba32ui")
 
 
 def accumulation(decode: int, sent: str, back: bool, tiled: int, cover: int = 0, kind: int = 1) -> Pass:
-    """Return the pass that makes a running sum from the one beside it, by adding or subtracting the frame in between.
+    """Return the shader pass that computes a running sum from the one beside it.
+
+    The pass adds or subtracts the frame between the two.
 
     Args:
-        decode: From `decoding`.
-        sent: How the frame was sent: "COLOURS", "NUMBERS" (Device.send), "PLANES" or "MOMENT". "AGAIN": it is the
-            difference of two sums that are there already.
-        back: Whether it is subtracted.
-        tiled: As of Sums.
-        cover: Which weights frames have: 0 none, 1 those of a layer, 2 those of the background behind layers.
-        kind: MOMENT of the shader, for moments.
+        decode: How it converts samples, from `decoding`.
+        sent: In which form the frame is on the device: "COLOURS" (RGBA), "NUMBERS" (one number per pixel, see
+            Device.send), "PLANES" (luma and chroma), or "MOMENT" (a frame that the pass computes from two filmed ones).
+            "AGAIN": nothing was sent, since the sums hold this frame at another position; it is the difference of two
+            of them.
+        back: Whether the frame is subtracted, to move the window back.
+        tiled: Sums.tiled.
+        cover: Which weights the frames are multiplied by: 0 none, 1 those of a layer, 2 those of the background behind
+            layers.
+        kind: For "MOMENT", which way of making it the shader uses: the value 1, 2 or 3 of its macro MOMENT, from
+            `_by_level`.
     """
     macros = {"DECODE": decode, "BACK": int(back), "TILED": tiled, "COVER": cover, sent: kind}
     return read_pass("accumulate", STORED=STORED_SUMS[cover], **macros)
@@ -50,15 +56,19 @@ def _in_fours(plane: np.ndarray) -> np.ndarray:
 
 
 def _by_level(moment: Moment, part: Part, given: Given) -> Iterator[tuple[int, tuple[int, int], Given]]:
-    """Yield what passes are needed to add a moment to a part of the window: one for each number of key moments.
+    """Yield the shader passes that add a computed frame to a part of the window.
+
+    In tiles with little motion, the frame needs fewer lookups along the motion (Moment.levels). Tiles of equal level
+    share a pass. A level without tiles in this part needs none.
 
     Args:
-        moment: The moment, whose tiles have different numbers of key moments (Moment.levels).
+        moment: The computed frame.
         part: The part of the window.
-        given: The arguments that all passes have.
+        given: Arguments of the shader that all passes have.
 
     Yields:
-        MOMENT of the shader, the extent of the pass, and its arguments.
+        The value of the shader's macro MOMENT (1, 2 or 3), the size (width, height) of the pass in invocations, and all
+        its arguments: `given` and those of the level.
     """
     (across, down), listed = TILE, 0
     rows = part.top // down, -(-(part.top + part.height) // down)
@@ -74,20 +84,21 @@ def _by_level(moment: Moment, part: Part, given: Given) -> Iterator[tuple[int, t
 
 
 class Sums(Window):
-    """A window of running sums of opaque 8-bit frames: the light of successive frames is the difference of two sums.
+    """A window of running sums of opaque 8-bit frames: any successive frames are the difference of two sums.
 
-    Textures are rgba16ui: three fields of 21 bits for each pixel. Layer p mod `layers` holds the sum at position p, for
-    the positions from `start` to `stop`, both included: the light of all frames before p, counted from an arbitrary
-    one. So only differences mean something: the sum at p + 1 less the sum at p is the frame at p. Positions beyond the
-    shot's ends have the frames that Options.edges shows there.
+    A position is a source frame's number, as if the footage had no ends. The sum at position p is the light of all
+    frames before p, counted from an arbitrary frame. So only differences have a meaning: the sum at p + 1 less the sum
+    at p is the frame at p. Beyond the shot's ends, Options.edges chooses the frame.
 
-    A window that moves by a frame, onwards or back, makes one new layer. Sums are integers that wrap around, so their
-    differences are exact, whatever the window held before.
+    The sum at position p is in layer p mod `layers` of the window. Textures are rgba16ui: 64 bits for each pixel, of
+    which each color has 21. Sums are integers that wrap around, so differences are exact. If the window moves by a
+    frame, onwards or back, only one new sum is made.
 
     Attributes:
-        start, stop: The positions of the first and the last sum.
-        whole: The value of white in a field, in the light that is summed (Options.light).
-        tiled: TILED of shaders/include/sums.glsl; 0: pixels are not stored tile by tile, in TILE.
+        start, stop: The positions of the first and the last sum that it holds.
+        whole: The number that stands for white in a frame's light.
+        tiled: How pixels lie in the textures, the macro TILED of shaders/include/sums.glsl. 0: as in the picture.
+            Otherwise tile by tile, which is faster on the software renderer llvmpipe.
     """
 
     def __init__(self, device: Device, source: FrameSource, capacity: int, shutters: int = 1) -> None:
@@ -114,12 +125,15 @@ class Sums(Window):
         return self._frames.values()
 
     def load(self, positions: np.ndarray, options: Options, shot: range) -> None:
-        """Read the frames at some positions that are not loaded, and sum them.
+        """Make the sums for all positions from the lowest to the highest of the given ones.
+
+        Sums that the window holds already are kept where they are of use. Only frames whose sums are missing are read.
 
         Args:
-            positions: From core.model.windows.positions; the first and the last are less than `capacity` apart.
-            options: Those of the picture.
-            shot: The source frames that the window may show (core.model.windows.source_frames).
+            positions: Frame numbers from core.model.windows.positions, at most `capacity` − 1 apart.
+            options: FrameState.options of the picture.
+            shot: The source frames of the shot. Beyond it, options.edges chooses the frame
+                (core.model.windows.source_frames).
         """
         self.device.use(self.release)
         self.shot = shot
@@ -138,9 +152,15 @@ class Sums(Window):
             self.start -= 1
 
     def _continues(self, first: int, frames: list[int], options: Options) -> bool:
-        """Return whether the present sums are of use for the positions from `first` on, which show `frames`.
+        """Return whether the window's sums can be extended to new positions, or have to be made anew.
 
-        They are if both ranges meet or overlap, and show the same frames where they overlap.
+        They can if they are of the same light (Options.light), if both ranges of positions touch or overlap, and if
+        they show the same frames where they overlap.
+
+        Args:
+            first: The first of the new positions.
+            frames: The source frames at the new positions, in order.
+            options: FrameState.options of the picture.
         """
         last = first + len(frames)
         overlap = range(max(first, self.start), min(last, self.stop))
@@ -157,9 +177,15 @@ class Sums(Window):
         self._frames = {position: frame for position, frame in self._frames.items() if start <= position < stop}
 
     def _together(self, frames: list[int], decode: int) -> list[int]:
-        """Return those of the next source frames that one pass may add: moments of a pair, one after another.
+        """Return the source frames that the next pass adds: the first of those given, and perhaps some after it.
 
-        The second frame of the pair may follow, if the pass decodes it as others do.
+        One pass can add several successive frames that are computed between the same two filmed frames; then also the
+        second of these, if `decode` is 1. It adds only one frame if that is filmed, if frames have weights, or if the
+        sums hold any of these frames already.
+
+        Args:
+            frames: The source frames that are still to be added, in order.
+            decode: How the pass converts samples, from `decoding`.
         """
         step, first = self.source.step, frames[0]
         pair = range(first, first - first % step + step + (decode == 1))
@@ -168,13 +194,15 @@ class Sums(Window):
         return [frame for frame, wanted in zip(frames, pair, strict=False) if frame == wanted]
 
     def _add(self, light: Light, frames: list[int], known: int, next_: int) -> int:
-        """Make the sum at a position, from the one beside it and the source frame between the two.
+        """Make the sum at a position from the sum beside it and the source frame between the two.
+
+        If several frames are given and computed together, the sums at the positions after it are made, too.
 
         Args:
-            light: What is summed (Options.light).
-            frames: That frame, and the next ones that the same pass may add (`_together`).
-            known: The position of the sum beside it.
-            next_: The position.
+            light: Options.light: in which light frames are summed.
+            frames: The source frame between the two positions, and the frames that the same pass may add (`_together`).
+            known: The position of the sum that is there.
+            next_: The position of the sum to make: known + 1, or known − 1 to go back.
 
         Returns:
             The number of sums that were made.
@@ -209,10 +237,13 @@ class Sums(Window):
         return across * down * self.layers, -(-self.source.width // across), -(-part.height // down)
 
     def _send(self, frames: list[int]) -> tuple[str, Given]:
-        """Send a source frame to the device, or what it and the next moments of its pair are made from.
+        """Send to the device what the next pass needs of a source frame: the frame, or what it is computed from.
+
+        Args:
+            frames: The source frame, then the frames that the same pass may add (`_together`).
 
         Returns:
-            How it was sent (`accumulation`), and the arguments of the pass that adds it.
+            The form in which it was sent (`sent` of `accumulation`), and the pass's arguments for it.
         """
         frame = self.source.decoded(frames[0])
         if isinstance(frame, Planes) and self.device.takes_planes:
@@ -240,11 +271,16 @@ class Sums(Window):
         }
 
     def _send_moments(self, first: Moment, count: int) -> Given:
-        """Send what moments of one pair are made from, and return the arguments of the pass that adds them.
+        """Send what computed frames are made from: two filmed frames and the motion between them.
+
+        What is on the device already is not sent again.
 
         Args:
-            first: The first moment to add.
-            count: How many are added.
+            first: The first frame to add; the others are computed from the same two filmed frames.
+            count: How many successive frames the pass adds.
+
+        Returns:
+            The arguments of the pass that computes and adds them.
         """
         layers, height, width, _ = first.vectors.shape
         vectors = self._extra.of("vectors", (width, height, layers), "rgba16")
@@ -270,9 +306,13 @@ class Sums(Window):
         }
 
     def _filmed(self, moment: Moment) -> tuple[Texture, int]:
-        """Return the two filmed frames that a moment is made from, on the device, and the layer of the first.
+        """Send the two filmed frames from which a frame is computed, unless they are on the device already.
 
-        Both stay for all moments of their pair, and one of them for the next pair.
+        Args:
+            moment: The computed frame.
+
+        Returns:
+            A texture array with both filmed frames, one per layer, and the layer (0 or 1) of the earlier one.
         """
         texture = self._extra.of("filmed", (self.source.width, self.source.height, 2), "r32ui")
         sent = self._sent
@@ -290,9 +330,11 @@ class Sums(Window):
 
 
 class WeightedSums(Sums):
-    """A window of running sums for layers (core.pixels.layering): of weights, and of opaque 8-bit frames times weights.
+    """A window of running sums for a layer or the background: of frames times weights, and of the weights.
 
-    Textures are rgba32ui: four fields of 32 bits. Where the weights are 1, pictures have the bits of Sums.
+    The frames are opaque and 8-bit. Textures are rgba32ui: red, green, blue, and the sum of weights (for the
+    background, of 1 − weight), with 32 bits each. Where all weights are 1, pictures are equal to those from Sums in
+    every bit.
     """
 
     def __init__(self, device: Device, source: WeightedFrames, capacity: int, shutters: int = 1) -> None:

@@ -34,10 +34,10 @@ class Stages:
         self._held: dict[int, Hashable] = {}  # {layer of _mattes: key of the values in it}
 
     def solve(self, labels: np.ndarray, count: int, *guided: Any, warm: bool = False) -> Texture:
-        """Return how much of each shutter a pixel gets (coefficients), diffused from labels, as a texture.
+        """Return how much of each shutter a pixel gets, spread from labels, as a texture (request.Stages.solve).
 
-        See request.Stages.solve. There are two kinds of diffusion, with and without a guide; the memory of the other is
-        freed.
+        There are two solvers, with and without a guide. The one that is not used now frees its memory. `warm` counts
+        only without a guide.
         """
         if guided and 0 < np.count_nonzero(labels) < labels.size:  # else nothing is diffused
             self._plain.release()
@@ -65,9 +65,9 @@ class Stages:
     def blend(
         self, beneath: Texture, mattes: tuple[Matte, ...], layers: Sequence[tuple[Hashable, np.ndarray]]
     ) -> Texture:
-        """Lay mattes over coefficients, and return the new coefficients (request.Stages.blend).
+        """Lay mattes over coefficients, and return the new coefficients as a texture array. See request.Stages.blend.
 
-        The last values of mattes stay on the device, and are not sent again.
+        Values of mattes stay on the device. Values whose key is unchanged since the last call are not sent again.
         """
         height, width = layers[0][1].shape
         values = self._textures.of("mattes", (width, height, min(len(mattes), MOST_MATTES)), "r32f")

@@ -34,24 +34,24 @@ def summable(source: FrameSource) -> bool:
 
 
 def beside(source: FrameSource, shutters: int) -> int:
-    """Return how many bytes a window must leave free: for a sent frame, and for the textures of other passes.
+    """Return how many bytes of the device's budget a window must leave for a frame to send and for other textures.
 
-    Diffusion along edges needs most: four times the coefficients.
+    Most of it is for the diffusion along edges: four times the size of the coefficients, at one per pixel.
 
     Args:
-        source: The footage.
+        source: The footage, for the picture's size.
         shutters: The number of shutters.
     """
     return source.width * source.height * (16 * (4 * -(-shutters // 4) + 2) + 4)
 
 
 class Part(NamedTuple):
-    """The part of a window in one texture array.
+    """Which part of a window is stored in one of its texture arrays.
 
     Attributes:
-        top: The first row of pixels in it.
-        height: The number of rows.
-        layers: Which layers of the window are in it.
+        top: The part's first row of pixels in the picture, from 0.
+        height: The number of rows of pixels.
+        layers: Which layers of the window (frames or running sums) the texture array has.
     """
 
     top: int
@@ -60,22 +60,23 @@ class Part(NamedTuple):
 
 
 class Window:
-    """The base of all windows, which hold the source frames that a picture exposes in texture arrays on a device.
+    """The base of all windows. A window stores the source frames that a picture exposes, in texture arrays on a device.
 
-    It also has the textures that the compositor draws into. Whether a window fits depends on sizes and on the device's
-    budget, but not on the free memory. So a picture has the same bits whatever was rendered before. A window is
-    released if another one needs its memory.
+    It also has the textures that the compositor draws into. Whether a window fits depends only on sizes and on the
+    device's budget, not on the memory that is free. So a picture has the same bits whatever was rendered before. If
+    another window needs memory, the device may release this one.
 
     Attributes:
-        capacity: The most frames that it holds.
-        layers: The layers of all texture arrays.
-        kind: Their GLSL format.
-        parts: What part of the window each texture array has.
+        capacity: The most source frames that it holds.
+        layers: How many layers it has, each with a frame or a running sum.
+        kind: The GLSL format of its texture arrays.
+        parts: The parts into which it is divided, one for each texture array.
         shutters: The number of shutters of its pictures.
-        is_open: Whether it has its textures; a released window cannot be used again.
-        sends: Whether every picture sends all frames, because the device has no room for them.
-        cover: Which weights its frames have (running_sums.accumulation); 0: none.
-        shot: The source frames that the loaded window may show.
+        is_open: Whether it has its textures. A released window cannot be used again.
+        sends: Whether frames stay on the host and are sent again for every picture, since the device has no room for
+            them.
+        cover: Which weights its frames were multiplied by: 0 none, 1 those of a layer, 2 those of the background.
+        shot: The source frames that it may show, from the last call of `load`.
     """
 
     layers: int
@@ -98,10 +99,11 @@ class Window:
         self.is_open = True
 
     def _allocate(self) -> None:
-        """Make the texture arrays and the picture.
+        """Create the texture arrays for frames or sums, and the texture that the compositor draws into.
 
         Raises:
-            NoDeviceError: There is no room for them, for all windows of a picture, and for other passes.
+            NoDeviceError: The device has no room: for these, for as many such windows as read the source, and for the
+                textures of other passes (`beside`).
         """
         width, height = self._texels(self.source.width, self.source.height)
         size = width * height * texel_bytes(self.kind) * self.layers * self.source.windows
@@ -113,9 +115,14 @@ class Window:
         self.picture()
 
     def _divided(self, most: int) -> list[Part]:
-        """Divide the window into bands of rows with all layers, each with a texture array of at most `most` bytes.
+        """Divide the window into bands of rows, so that no texture array becomes too large. Each band has all layers.
 
-        The height of a band is a multiple of BLOCK rows, and at least that, except for the last one.
+        Args:
+            most: The most bytes of a band's texture array. A band still has at least BLOCK rows.
+
+        Returns:
+            The bands from top to bottom. The height of each is a multiple of BLOCK rows; the last one has the remaining
+            rows.
         """
         source = self.source
         row_bytes = source.width * texel_bytes(self.kind) * self.layers
@@ -136,10 +143,10 @@ class Window:
         yield from zip(self.parts, self._textures, strict=True)
 
     def decode(self, light: str) -> int:
-        """Return how passes convert the stored samples to the light that is summed (see `decoding`).
+        """Return how shaders convert the samples that the window stores: 0, 1 or 2, as from `decoding`.
 
         Args:
-            light: Options.light.
+            light: Options.light: in which light frames are summed.
         """
         return 0
 
@@ -165,10 +172,12 @@ class Window:
 
 
 class Frames(Window):
-    """A window of frames as they are: source frame i is in layer i mod `layers`.
+    """A window that stores frames, each in a layer of its own: source frame i in layer i mod `layers`.
 
-    If the device has no room for all parts, the frames stay on the host, and every picture sends them part by part. Its
-    bits are the same.
+    Samples are stored as they are, except for sRGB floats, which are converted to linear light.
+
+    If the device has no room for the whole window, the frames stay on the host, and every picture sends them part by
+    part. Pictures have the same bits in both cases.
     """
 
     def __init__(self, device: Device, source: FrameSource, capacity: int, shutters: int = 1) -> None:
@@ -258,9 +267,10 @@ class Frames(Window):
 
 
 class WholeFrames(Frames):
-    """A window of frames that are not divided into bands, since exposures that follow something need whole ones.
+    """A window of frames that are not divided into bands of rows, for exposures that follow a motion.
 
-    Each texture array has as many frames as BAND_BYTES allow.
+    These read pixels anywhere in a frame. Instead, the frames are divided among texture arrays, with as many in each as
+    BAND_BYTES allow.
     """
 
     def _divided(self, most: int) -> list[Part]:
@@ -272,9 +282,10 @@ class WholeFrames(Frames):
 
 
 class PackedFrames(WholeFrames):
-    """A window of whole, opaque 8-bit frames, packed into 32 bits a pixel for exposures that follow something.
+    """A window of whole, opaque 8-bit frames for exposures that follow a motion, converted for quick interpolation.
 
-    shaders/pack.glsl packs them, in the light that is summed.
+    shaders/pack.glsl converts each frame to the light that is summed (Options.light), and packs a pixel's color into 32
+    bits. A texel has the pixel and the one below it. A rim of pixels repeats the frame's edges.
     """
 
     _light: Light = "linear"
@@ -306,13 +317,14 @@ class PackedFrames(WholeFrames):
 
 
 def decoding(stored: str, light: str) -> int:
-    """Return how shaders convert stored samples to the light that is summed, the macro DECODE.
-
-    It is 0 for unchanged samples, 1 to linear light, and 2 to encoded values.
+    """Return how shaders convert stored samples to the light that is summed: their macro DECODE.
 
     Args:
-        stored: The samples' transfer, "srgb" or "linear".
-        light: What is summed (Options.light).
+        stored: The transfer of the stored samples, "srgb" or "linear".
+        light: Options.light: "linear", or "encoded" for sRGB values.
+
+    Returns:
+        0: leave samples unchanged; 1: convert sRGB values to linear light; 2: convert linear light to sRGB values.
     """
     summed = "srgb" if light == "encoded" else "linear"
     return 0 if stored == summed else 1 if summed == "linear" else 2

@@ -19,12 +19,16 @@ _NAME = re.compile(r"\.part-[0-9a-f]{16}")
 
 @contextmanager
 def writing(path: Path) -> Iterator[Path]:
-    """Yield a temporary path of the same name to write to, and move the written file to `path` at the end.
+    """Write a file whole or not at all: yield a temporary path to write to, then move that file to `path`.
 
-    If the block raises an exception, the temporary file is removed. A link at `path` is replaced, not followed.
+    The file is moved when the `with` block ends. If the block raises an exception, the temporary file is removed, and
+    `path` stays as it was. A symbolic link at `path` is replaced, not followed.
+
+    Args:
+        path: Where the file is to be. The temporary path has the same file name, in a temporary folder beside it.
 
     Raises:
-        OSError: It cannot be written.
+        OSError: The temporary folder cannot be made, or the file cannot be moved.
     """
     with part_folder(path.parent) as folder:
         yield folder / path.name
@@ -33,12 +37,13 @@ def writing(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def part_folder(parent: Path) -> Iterator[Path]:
-    """Yield a new temporary folder in `parent`, and remove it with its content at the end.
+    """Yield a new temporary folder in `parent`. When the `with` block ends, remove the folder with its content.
 
-    Libraries write files by path. In a new folder, nobody can have placed a link, and no other process writes.
+    It is for libraries that take a path to write to. Since the folder is new, nobody can have placed a link in it, and
+    no other process writes there.
 
     Raises:
-        OSError: It cannot be made.
+        OSError: The folder cannot be made.
     """
     folder = new_part(parent)
     try:
@@ -77,9 +82,10 @@ def clear_up(parent: Path) -> None:
 
 
 def _last_written(folder: Path) -> float:
-    """Return when a folder or a file in it last changed, in seconds since 1970.
+    """Return when a folder, or any entry directly in it, was last modified, in seconds since 1970.
 
-    Return infinity if the time is unknown, so that `clear_up` never removes the folder.
+    The latest of these times counts. If one cannot be read, the result is infinity, so that `clear_up` leaves the
+    folder.
     """
     try:
         times = [entry.stat(follow_symlinks=False).st_mtime for entry in os.scandir(folder)]

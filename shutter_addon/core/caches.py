@@ -12,10 +12,11 @@ T = TypeVar("T")
 
 
 class LastValue(Generic[T]):
-    """A cache of one value, which is made again when it is asked for with another key.
+    """A cache of one value. If it is asked for with another key, the value is made again.
 
     Attributes:
-        made: How many values have been made, which tells apart values with equal keys.
+        made: How many values have been made so far. A key for what is made from the value can include this number,
+            which changes when the value is made again, even if its key is the same.
     """
 
     def __init__(self) -> None:
@@ -23,15 +24,15 @@ class LastValue(Generic[T]):
         self._kept: tuple[Hashable, T, bool] | None = None  # key, value, and whether that is exact
 
     def get(self, key: Hashable, make: Callable[[], T], *, quick: bool = False) -> T:
-        """Return the cached value if its key equals `key`, else make and cache one.
+        """Return the cached value if it has this key. Otherwise make, cache and return a new one.
 
-        If `make` raises an exception, nothing is cached.
+        The old value is dropped first, so nothing is cached if `make` raises an exception.
 
         Args:
-            key: Everything that the value depends on, as hashable plain data.
+            key: Everything that the value depends on, as plain data; keys are compared with ==.
             make: Makes the value.
-            quick: Whether an approximation suffices, as the cached value or as what `make` returns. A request that is
-                not quick does not get an approximation.
+            quick: Whether an approximate value is enough. What `make` returns then counts as approximate, and is
+                returned only to quick calls. An exact value is returned to all.
         """
         if self._kept is None or self._kept[0] != key or not (quick or self._kept[2]):
             self.clear()
@@ -47,7 +48,10 @@ class LastValue(Generic[T]):
 
 
 class RecentValues(dict[K, T]):
-    """A cache of the values that were used last: a dict by key, with the least recently used value first."""
+    """A cache of the values that were used last: a dict in order of use, the least recently used value first.
+
+    Get and add values with `ask` and `keep`, which drop old ones. Plain access by key does not change the order.
+    """
 
     def ask(self, key: K, make: Callable[[], T], most: int) -> T:
         """Return the cached value of a key, or make and cache it. Drop the least recently used ones beyond `most`."""

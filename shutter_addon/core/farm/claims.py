@@ -51,14 +51,14 @@ class Claims:
             self.release(name)
 
     def take(self, name: str) -> bool:
-        """Try to reserve a piece of work for this process. Return False if another process has reserved it.
+        """Try to reserve a piece of work, and return whether this process has got it.
 
-        A claim that another process has abandoned is taken over.
+        It fails while another process holds the claim. A claim that the other process has abandoned is taken over.
 
-        Check after this call whether the work has been done already, since the last holder may have finished it.
+        If this returns True, check whether the work has been done already: the last holder may have finished it.
 
         Args:
-            name: Names the work: letters, digits and underscores.
+            name: A name for the piece of work, the same on all machines: letters, digits and underscores.
 
         Raises:
             OSError: The folder cannot be written to.
@@ -101,9 +101,13 @@ class Claims:
 
 
 def _make(path: Path) -> bool:
-    """Create the file of a claim. Return True, or False if the file exists already.
+    """Create the file of a claim, and return whether it was created: False if it exists already.
 
-    Its content tells people whose it is, and makes it differ from a later claim of the same name.
+    Its content is a random number, which makes it differ from a later claim of the same name, and for people the
+    machine and the process.
+
+    Raises:
+        OSError: The file cannot be written.
     """
     try:
         file = path.open("x", encoding="utf-8")
@@ -119,11 +123,13 @@ def _make(path: Path) -> bool:
 
 
 def _look(path: Path) -> tuple[bytes, int] | int | None:
-    """Return a value that changes when the file of a claim is touched or replaced.
+    """Return the state of a claim's file, which differs once the file has been touched or replaced.
 
-    This is (content, time of change in ns), an error number if the file cannot be read, or None if it is missing.
+    The file is opened for this, since network drives may otherwise tell an old time.
 
-    The file is opened, since network drives then look at its present state.
+    Returns:
+        (content, time of change in ns). If the file cannot be read, the error number instead. None: the file is
+        missing.
     """
     try:
         with path.open("rb") as file:

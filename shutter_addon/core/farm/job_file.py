@@ -28,10 +28,13 @@ class EditVersion:
     """What tells versions of an edit apart: everything that its pictures depend on, except for the device.
 
     Attributes:
-        extension, blender: Their versions.
-        colours: The OpenColorIO configuration: its SHA-256, the name of a built-in one, or "" for Blender's own.
+        extension: The version of this extension.
+        blender: The version of Blender.
+        colours: The OpenColorIO configuration: the name of one that is built into OpenColorIO, the SHA-256 of another
+            one's file, or "" for the one that comes with Blender.
         blend: SHA-256 of the .blend file, hexadecimal.
-        footage: SHA-256 of all other files that the edit reads, in the order in the .blend file.
+        footage: One SHA-256, hexadecimal, for all other files that pictures are made from, in the order in which the
+            .blend file names them. Sounds do not count. Of a large file, only the size and some blocks count.
     """
 
     extension: str
