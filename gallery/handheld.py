@@ -1,4 +1,4 @@
-"""A long exposure held in the hand: houses stand still as on a tripod, and the lights of cars trail.
+"""A handheld long exposure: houses stand still as on a tripod, and the lights of cars trail.
 
 The recipe has the keys that the command made, from a recipe without:
 `shutter track footage/0001.exr --recipe R.json --camera --frame 16 --all-keys --output handheld.json`
@@ -155,16 +155,14 @@ def still(shot):
     truth = np.clip(light.to_encoded(exposed(steady(shot.footage.parents[1] / "steady"))), 0, 1)
     plain = np.clip(light.to_encoded(exposed(shot.footage)), 0, 1)
     return stills.sheet(
-        stills.row(
-            Panel(shot.source(FRAME), "A frame, held in the hand"), Panel(plain, f"{COUNT} frames, as they are")
-        ),
-        stills.row(Panel(shot.result(FRAME), "The same, following the camera"), Panel(truth, "On a tripod")),
+        stills.row(Panel(shot.source(FRAME), "One handheld frame"), Panel(plain, f"{COUNT} frames, averaged")),
+        stills.row(Panel(shot.result(FRAME), "The same with Stabilize Exposure"), Panel(truth, "On a tripod")),
     )
 
 
 ITEM = Item(
     name="handheld",
-    title="a long exposure held in the hand, as if on a tripod",
+    title="a handheld long exposure, as if on a tripod",
     footage=footage,
     recipes=("handheld.json",),
     frames=(FRAME, FRAME),

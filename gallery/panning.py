@@ -1,4 +1,4 @@
-"""A panning shot of footage that a still camera took: the exposure follows a scooter, and its street streaks.
+"""A panning shot of footage from a camera that stood still: the exposure follows a scooter, and its street streaks.
 
 The stroke was drawn at frame 18; the recipe has the keys that Track made of it:
 `shutter track footage/0001.png --recipe R.json --region scooter --frame 18 --output panning.json`
@@ -201,8 +201,8 @@ def still(shot):
     count = f"{WINDOW} frames"
     return stills.sheet(
         stills.row(
-            Panel(shot.scribbles(FRAME, dim=1.0), "A still camera, and one stroke, tracked"),
-            Panel(shot.everywhere(FRAME, "Panning"), f"{count}, as a still camera exposes them"),
+            Panel(shot.scribbles(FRAME, dim=1.0), "The camera stands still; one stroke, tracked"),
+            Panel(shot.everywhere(FRAME, "Panning"), f"{count}, averaged"),
         ),
         stills.row(
             Panel(shot.result(FRAME), f"{count} that follow the stroke"), Panel(panned, "The truth: a camera that pans")
@@ -212,7 +212,7 @@ def still(shot):
 
 ITEM = Item(
     name="panning",
-    title="a panning shot of what a still camera took",
+    title="a panning shot of footage from a camera that stood still",
     footage=footage,
     recipes=("panning.json",),
     frames=(WINDOW // 2 + 1, COUNT - WINDOW // 2),
