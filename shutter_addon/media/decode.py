@@ -257,11 +257,14 @@ class _Run:
         return promised - self._end > MISSING
 
     def _decoded(self, seeking: bool) -> Generator[_Timed, None, None]:
-        """Yield frames in the order in which they are shown.
+        """Yield the stream's frames with their time stamps, in the order in which they are shown.
+
+        A damaged frame is not yielded; its time stamp goes to `lost`.
 
         Args:
-            seeking: Begin at the first key frame, and skip frames shown before it: they may depend on frames that were
-                not decoded (an open group of pictures).
+            seeking: True after a seek: begin at the first key frame where decoding may begin (_Landmarks.is_sound), and
+                skip frames with an earlier time stamp, which may refer to frames before that key frame. False: yield
+                every frame.
         """
         floor: float | None = None if seeking else -math.inf
         misleading = self.file.container.format.name in MISLEADING
@@ -310,9 +313,14 @@ class _Run:
             return []
 
     def _settle(self, time: float) -> None:
-        """Note frames before a time as lost (`lost`) if the decoder has not given them and there was an error.
+        """Add frames that the decoder failed to give to `lost`, the list of lost time stamps.
 
-        Without an error, frames that are missing are not meant to be shown.
+        A frame is lost if the decoder was given its data, frames with a later time stamp come out already, and there
+        has been an error (`fault`). Without an error, a missing frame is one that is not meant to be shown.
+
+        Args:
+            time: The time stamp of the frame that the decoder has just given; infinity at the end. Earlier ones are
+                settled.
         """
         while self._awaited and self._awaited[0] <= time:
             awaited = heapq.heappop(self._awaited)
@@ -321,10 +329,10 @@ class _Run:
 
 
 def _known(run: _Run) -> _Timed:
-    """Return the frame that a decode (`_Run.shown`) has reached.
+    """Return the frame that a decode has reached (`_Run.shown`), for callers that need one.
 
     Raises:
-        MediaError: There is none, as when the file was replaced.
+        MediaError: There is none (`shown` is None), because no frame could be decoded. The file may have been replaced.
     """
     if run.shown is None:
         raise MediaError(run.fault or "no frame of it can be decoded")
@@ -348,10 +356,11 @@ def reason(error: Exception) -> str:
 
 
 def _tags(codec: VideoCodecContext) -> tuple[int, bool]:
-    """Return a movie's tags that Blender reads once, for all frames.
+    """Return the two color tags of a movie's header that Blender uses for all of its frames.
 
     Returns:
-        The YUV matrix by its number in ITU-T H.273, and whether samples have full range.
+        The YUV matrix as a number of ITU-T H.273 (5, BT.601, if libswscale does not know the tagged one), and True if
+        samples have the full range, False for the limited range of video.
     """
     # libswscale assumes BT.601 for matrices that it does not know.
     space = {1: 1, 4: 4, 7: 7, 9: 9, 10: 9}.get(int(codec.colorspace), 5)
@@ -359,10 +368,15 @@ def _tags(codec: VideoCodecContext) -> tuple[int, bool]:
 
 
 def _video_stream(container: InputContainer, name: str, number: int) -> VideoStream:
-    """Return a video stream of an opened file; `number`: which one, without cover pictures.
+    """Return one of the video streams of an opened file.
+
+    Args:
+        container: The opened file.
+        name: The file's name, for the error message.
+        number: Which stream, from 0. Cover pictures do not count.
 
     Raises:
-        MediaError: There is no such stream, or the file is no movie. `name` is its name in the message.
+        MediaError: There is no such stream, its codec is unknown, or the file is no movie, but a picture or a text.
     """
     pictures = av.stream.Disposition.attached_pic
     streams = [s for s in container.streams.video if not s.disposition & pictures]

@@ -37,12 +37,14 @@ _SHAPE = "roi", "roi_full", "channelnames", "format", "channelformats", "deep"
 
 
 def identity(source: FrameSource) -> dict:
-    """Describe a source by its files' content and how they are read, so that it is known wherever its files lie.
+    """Describe footage by the content of its files and the way they are read, but not by their names or folders.
 
-    A change in a file larger than WHOLE goes unnoticed if it keeps the size and all blocks that are hashed.
+    Files made from the footage are named after this description, so they are found again after the footage has moved.
+    Of a file with more than WHOLE bytes, only the size and some blocks count, so a change elsewhere in it goes
+    unnoticed.
 
     Returns:
-        Plain data, for `key`.
+        Values that JSON can store, as part of an argument for `key`.
 
     Raises:
         MediaError: A file is gone.
@@ -55,10 +57,11 @@ def identity(source: FrameSource) -> dict:
 
 
 def key(made_of: dict) -> str:
-    """Return a short hash for the name of a file: 12 hexadecimal digits.
+    """Return a short hash for the name of a file that is made from other data: 12 hexadecimal digits.
 
     Args:
-        made_of: Everything that the file is made from, as plain data.
+        made_of: Everything that the file's content depends on, as values that JSON can store. Equal ones give equal
+            hashes.
     """
     return hashlib.sha256(json.dumps(made_of, sort_keys=True).encode()).hexdigest()[:12]
 
@@ -68,10 +71,11 @@ def content_digest(path: Path, whole: int = WHOLE) -> bytes:
 
     Args:
         path: The file.
-        whole: Of a file with more bytes, only the size and blocks spread over it are hashed.
+        whole: The most bytes of a file that is hashed completely. Of a larger file, the hash covers only the size and
+            BLOCKS blocks, spread evenly over it.
 
     Raises:
-        MediaError: The file is gone or is no regular file.
+        MediaError: The file is missing, cannot be read or is no regular file.
     """
     try:
         status = path.stat()
@@ -84,9 +88,16 @@ def content_digest(path: Path, whole: int = WHOLE) -> bytes:
 
 @lru_cache(maxsize=1 << 17)  # a sequence of an hour and a half
 def _hash(path: Path, size: int, _mtime: int, whole: int) -> bytes:
-    """Return the SHA-256 of a file's content or, over `whole` bytes, of its size and of blocks spread over it.
+    """Return the SHA-256 of a file's content or, above `whole` bytes, of its size and of blocks spread over it.
 
-    It is cached: a file of the same size and time of change is not read again.
+    Results are cached by all arguments. So a file whose size and time of change are the same as before is not read
+    again.
+
+    Args:
+        path: The file.
+        size: Its size in bytes.
+        _mtime: The time of its last change in nanoseconds. It only tells cached results apart.
+        whole: The most bytes of a file that is hashed completely.
     """
     with path.open("rb") as file:
         if size <= whole:
@@ -107,16 +118,16 @@ def size_of(path: Path) -> int | None:
 
 
 def opened(path: Path, spec: ImageSpec) -> ImageInput | None:
-    """Open a picture file that the extension has written, but only if its header is as expected.
+    """Open a picture file that the extension has written earlier, but only if its header is as expected.
 
     Args:
         path: The file.
-        spec: The size and samples that it must have. A file that somebody else has put there may have millions of
-            pixels.
+        spec: The size, channels and sample type that the file must have. Without this check, a file that somebody else
+            has put there could take any amount of memory.
 
     Returns:
-        The file, which the caller closes; its samples may still be damaged. None: it is missing, a link, far too
-        large or cannot be read, or its size or samples differ from `spec`.
+        The opened file, which the caller has to close; its samples may still be damaged. None: the file is missing, a
+        link, far too large or unreadable, or its header differs from `spec`.
     """
     size = size_of(path)
     if size is None or size > 2 * spec.image_bytes() + _LARGER:
@@ -133,15 +144,16 @@ def opened(path: Path, spec: ImageSpec) -> ImageInput | None:
 
 
 def read(path: Path, spec: ImageSpec, description: str = "") -> np.ndarray | None:
-    """Return the samples of a picture file that the extension has written.
+    """Return the samples of a picture file that the extension has written earlier.
 
     Args:
         path: The file.
-        spec: The size and samples that the file must have.
-        description: What the file's description must begin with.
+        spec: The size, channels and sample type that the file must have.
+        description: The text with which the "ImageDescription" in the file's metadata must begin. "": any will do.
 
     Returns:
-        (height, width, channels), of the type of `spec`. None if the file is missing, damaged or not such a file.
+        An array (height, width, channels), of the type of `spec`. None: the file is missing or damaged, or does not
+        match `spec` or `description`.
     """
     if (image := opened(path, spec)) is None:
         return None
@@ -171,14 +183,18 @@ def refuse_link(path: Path) -> None:
 
 
 class StoredVectors:
-    """Finds the optical flow between two pictures and stores it in a folder, or reads it if it is there already."""
+    """Finds the optical flow between two pictures, and keeps it in a folder, where it is found the next time.
+
+    A file's name is a hash of the two pictures, so equal pictures are not computed again.
+    """
 
     def __init__(self, folder: Path, writes: bool) -> None:
-        """Prepare to read and store optical flow vectors in a folder.
+        """Prepare to read and write files of optical flow in a folder.
 
         Args:
-            folder: The folder, which may be missing.
-            writes: Whether to store vectors there that are not found in it, if it can be written to.
+            folder: The folder, which need not exist yet.
+            writes: Whether flow that had to be computed is also written there. A failure to write is no error; nothing
+                more is written after it. False: only existing files are read.
         """
         self._folder, self._writes = folder, writes
         self._is_new = True  # nothing was written yet

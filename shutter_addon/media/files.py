@@ -54,10 +54,10 @@ def stamp(path: str | Path) -> tuple[int, int] | None:
 
 
 def check_sound(path: str | Path) -> None:
-    """Check that a file has sound. Without PyAV, any file passes.
+    """Check that a file has sound. Without PyAV this cannot be known, and any existing, non-empty file passes.
 
     Raises:
-        MediaError: It has none, or cannot be read.
+        MediaError: The file is missing or unreadable, or has no sound.
     """
     path = check_file(path)
     if pyav_missing():

@@ -26,15 +26,16 @@ _OPTIONS = {"crf": "8", "preset": "fast", "tune": "fastdecode", "g": "12", "bf":
 
 
 def write_part(path: Path, pictures: Iterable[np.ndarray], fps: Fraction) -> None:
-    """Write pictures as an H.264 movie, complete or not at all.
+    """Write pictures as an H.264 movie (MP4), which gets its final name only when it is complete.
 
     Args:
         path: The movie.
-        pictures: Levels (H, W, 3 or 4) uint8; alpha is ignored. Errors of the iterable are not caught.
+        pictures: sRGB values (H, W, 3 or 4) uint8, all of one size; alpha is ignored. Of its errors, OSError,
+            ValueError, IndexError and OverflowError become a MediaError; all others are passed on.
         fps: The frame rate.
 
     Raises:
-        MediaError: The movie cannot be written.
+        MediaError: The movie cannot be written, or there are no pictures.
     """
 
     def fill(container: OutputContainer) -> int:
@@ -52,14 +53,15 @@ def write_part(path: Path, pictures: Iterable[np.ndarray], fps: Fraction) -> Non
 
 
 def _write(path: Path, fill: Callable[[OutputContainer], int]) -> None:
-    """Write an MP4, complete or not at all.
+    """Write an MP4, which gets its final name only when it is complete.
 
     Args:
         path: The file.
-        fill: Adds the frames to the opened file, and returns their number.
+        fill: Adds streams and frames to the opened file, and returns how many frames it has added. The written file is
+            checked to have at least so many.
 
     Raises:
-        MediaError: It cannot be written.
+        MediaError: The file cannot be written, or has fewer frames.
     """
     import av
 
@@ -101,12 +103,12 @@ def _frame(picture: np.ndarray, stream: VideoStream, index: int) -> VideoFrame:
 
 
 def join(paths: Sequence[Path], output: Path, fps: Fraction) -> None:
-    """Join parts of `write_part` into one movie without encoding them again.
+    """Join movies of `write_part` into one, without encoding them again.
 
     Args:
-        paths: The parts, in order.
-        output: The movie.
-        fps: The frame rate.
+        paths: The movies, in the order in which they follow one another.
+        output: The new movie. It gets its final name only when it is complete.
+        fps: The frame rate of all of them.
 
     Raises:
         MediaError: A part cannot be read, or the movie cannot be written.

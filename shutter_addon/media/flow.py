@@ -36,7 +36,13 @@ VERSION = 2  # raise it when `found` gives something else of the same pictures
 
 
 class Between:
-    """Makes the moments between two frames (frame_source.Pair). Nothing but these frames has an effect on them."""
+    """Makes moments, new frames at times between two frames, by the optical flow between these two (frame_source.Pair).
+
+    They depend on nothing but the two frames, so they are the same whichever other frames are read.
+
+    Attributes:
+        ends: The first and the second frame, (H, W, 4).
+    """
 
     def __init__(
         self,
@@ -46,14 +52,15 @@ class Between:
         alpha: str = "opaque",
         find: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
     ) -> None:
-        """Find the flow between two frames.
+        """Find the optical flow between two frames.
 
         Args:
-            first: (height, width, 4), of a FrameSource's dtype.
-            second: Like `first`.
-            transfer: How samples are encoded, as in FrameSource. New frames are encoded in the same way.
-            alpha: The alpha mode, as in FrameSource, of these and new frames.
-            find: Finds the flow, with the arguments and result of `found`. None: `found` itself.
+            first: The earlier frame, (H, W, 4) RGBA, of a FrameSource's dtype.
+            second: The later frame, of the same shape and dtype.
+            transfer: The encoding of samples, as in FrameSource. New frames have the same.
+            alpha: The alpha mode, as in FrameSource. New frames have the same.
+            find: Called in place of `found`, with the same arguments and result, to reuse stored flow. None: `found`
+                itself.
         """
         self.ends, self._transfer, self._alpha = (first, second), transfer, alpha
         self._sides: list[_Carriers] | None = None
@@ -76,15 +83,19 @@ class Between:
         return [_encoded(end, self._transfer, self._alpha) for end in self.ends]
 
     def moment(self, pair: tuple[int, int], number: int, steps: int) -> np.ndarray | Moment:
-        """Return one of the moments (new frames) between the two frames; `rgba` makes its picture.
+        """Return one of the moments, which lie at equal distances in time between the two frames.
 
-        What only one of the two frames shows is taken from that frame; everything else is mixed. If the frames are
-        equal or have nothing in common, return the nearer frame itself (H, W, 4).
+        Its picture is not computed yet; Moment.rgba does that. The picture is a mix of both frames; what only one of
+        them shows is taken from that one.
 
         Args:
-            pair: The numbers of the two frames, for Moment.pair.
-            number: Which moment, 1 to steps − 1.
-            steps: How many equal steps lead from the first frame to the second.
+            pair: The numbers of the two frames, stored in Moment.pair.
+            number: Which moment, 1 to steps − 1, in order of time.
+            steps: The number of moments, plus 1.
+
+        Returns:
+            The moment. If the frames are equal or have nothing in common: the nearer frame (H, W, 4), in the middle the
+            first.
         """
         if (sides := self._sides) is None:
             return self.ends[2 * number > steps]
@@ -120,11 +131,13 @@ class Between:
         return before + _late(spread[..., 2:] / np.float32(255), key, keys) * (after - before)
 
     def _light(self, vectors: np.ndarray, key: int) -> np.ndarray:
-        """Return the linear light of a key moment, (H, W, 3 or 4) float32.
+        """Return the picture of a key moment in linear light, (H, W, 3 or 4) float32, premultiplied.
+
+        Key moments are those that are made from both frames; other moments are mixes of two key moments.
 
         Args:
-            vectors: Moment.vectors.
-            key: The key moment's number; the first and the last are the two frames.
+            vectors: Moment.vectors, whose length is keys − 1.
+            key: The number of the key moment, 0 to keys. 0 is the first frame, and `keys` the second.
         """
         keys = len(vectors) + 1
         if key % keys == 0:
@@ -133,12 +146,12 @@ class Between:
 
 
 def luma(frame: np.ndarray, transfer: str, alpha: str) -> np.ndarray:
-    """Convert a source's frame to grey display values (H, W) uint8.
+    """Convert a source's frame to grey display values (H, W) uint8. Transparent pixels count as black.
 
     Args:
-        frame: (H, W, 4).
-        transfer: As in FrameSource.
-        alpha: As in FrameSource.
+        frame: The frame, (H, W, 4).
+        transfer: The encoding of its samples, as in FrameSource.
+        alpha: Its alpha mode, as in FrameSource.
     """
     if frame.dtype == np.uint8 and (transfer, alpha) == ("srgb", "opaque"):
         return cv2.cvtColor(frame, cv2.COLOR_RGBA2GRAY)
@@ -156,13 +169,13 @@ def resized(picture: np.ndarray, size: tuple[int, int]) -> np.ndarray:
 
 
 def of_rows(frame: np.ndarray, source: FrameSource, most: int, *, turned: bool = False) -> np.ndarray:
-    """Return a source's frame in grey (H, W) uint8, reduced to `most` rows if it has more.
+    """Return a source's frame as a small grey picture (h, w) uint8, for measuring motion.
 
     Args:
-        frame: (H, W, 4).
-        source: The source that the frame comes from.
-        most: The most rows.
-        turned: Swap rows and columns first.
+        frame: The frame, (H, W, 4).
+        source: Its source, which tells how samples are encoded.
+        most: The most rows of the result. A picture with more is reduced, and keeps its aspect.
+        turned: Whether to swap rows and columns first, so that `most` limits the frame's columns.
     """
     picture = luma(frame, source.transfer, source.alpha)
     picture = np.ascontiguousarray(picture.T) if turned else picture
@@ -189,8 +202,10 @@ def found(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Find the optical flow between two grey pictures (H, W) uint8 in both directions, for every STEPth pixel.
 
     Returns:
-        float16 (⌈H / STEP⌉, ⌈W / STEP⌉, 6): the vector from the first picture to the second (x and y in pixels) and its
-        cost, then the same from the second to the first. The cost is the difference of the vector's two ends in levels.
+        float16 (⌈H / STEP⌉, ⌈W / STEP⌉, 6). Channels 0 and 1: the vector from a pixel of the first picture to its place
+        in the second, x and y in pixels. 2: the vector's cost, which is the difference between the grey values at its
+        two ends, on average around it; 0 is best, 255 worst. Channels 3 to 5: the same from the second picture to the
+        first.
     """
     height, width = first.shape
     shape = -(-height // STEP), -(-width // STEP)
@@ -217,17 +232,18 @@ def _half(picture: np.ndarray) -> np.ndarray:
 
 
 def _dis(first: np.ndarray, second: np.ndarray, stride: int, smoothness: float = 20, quick: bool = False) -> np.ndarray:
-    """Run OpenCV's DIS optical flow.
+    """Find optical flow with OpenCV's DIS method.
 
     Args:
-        first: (H, W) uint8.
-        second: Like `first`.
-        stride: Pixels from a patch to the next.
-        smoothness: Of the vectors (OpenCV's alpha).
-        quick: Refine vectors less. With a stride of 5, this takes a third of the time, and moments look as good.
+        first: The picture where the vectors start, (H, W) uint8.
+        second: The picture where they end, of the same shape.
+        stride: The distance between the patches that are compared, in pixels. A smaller one is slower and more exact.
+        smoothness: The weight of smooth vectors (OpenCV's alpha).
+        quick: Whether to refine the vectors less. With a stride of 5, that takes a third of the time, and moments look
+            as good.
 
     Returns:
-        Vectors (H, W, 2) from the first picture's pixels to the second's, x and y in pixels.
+        (H, W, 2): for each pixel of the first picture, the vector to its place in the second, x and y in pixels.
     """
     # A new one each time: it keeps buffers, which threads must not share.
     dis = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
@@ -249,11 +265,13 @@ _Carriers = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 def _meet(pictures: list[np.ndarray], sides: list[_Carriers]) -> bool:
-    """Return whether two pictures show the same things: whether enough vectors have ends that look alike.
+    """Return whether two pictures have enough in common for moments between them. Those around a cut do not.
+
+    In both directions, a share of at least SHARED of all vectors must have a low cost (see UNLIKE).
 
     Args:
-        pictures: Grey pictures (H, W) uint8.
-        sides: The flow vectors from each picture to the other, with their costs.
+        pictures: The two pictures, grey (H, W) uint8. Their brightness limits the cost.
+        sides: The vectors from the first picture to the second, and those from the second to the first.
     """
     brightness = max(float(each.mean()) for each in pictures)
     unlike = max(UNLIKE * min(brightness / GREY, 1.0), NOISE)
@@ -261,12 +279,14 @@ def _meet(pictures: list[np.ndarray], sides: list[_Carriers]) -> bool:
 
 
 def _of_keys(sides: list[_Carriers], shape: tuple[int, ...], keys: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return Moment.vectors and Moment.levels for a number of key moments between two frames.
+    """Return Moment.vectors and Moment.levels for the moments between two frames.
+
+    `levels` tells for each tile of the picture how many of the key moments it needs: the less it moves, the fewer.
 
     Args:
-        sides: The vectors from each frame to the other.
+        sides: The vectors from the first frame to the second, and those from the second to the first.
         shape: The frames' (H, W).
-        keys: Into how many parts key moments divide the time between the frames, a power of two.
+        keys: Into how many equal parts the key moments divide the time between the frames, a power of two.
     """
     paths = np.stack([_paths(sides, shape, key / keys) for key in range(1, keys)])
     way = paths[..., :2]
@@ -298,17 +318,20 @@ def _paths(sides: list[_Carriers], shape: tuple[int, ...], t: float) -> np.ndarr
 def _carry(
     places: np.ndarray, vectors: np.ndarray, costs: np.ndarray, shape: tuple[int, ...], t: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Move flow vectors to the pixels through which they pass at a time; the cheapest one wins a pixel.
+    """Move flow vectors along themselves to a time between two frames, and return which vector passes each place then.
+
+    Where several pass, the one with the lowest cost is chosen. Lengths are in cells of STEP × STEP pixels.
 
     Args:
-        places: Where the vectors start, (2, n), in cells of STEP pixels (_Carriers).
-        vectors: The vectors from one frame to the other, (2, n), in the same unit.
-        costs: Their costs (n,), the highest first.
-        shape: The frames' (H, W).
+        places: Where the vectors start, x and y (2, n), as in _Carriers.
+        vectors: The vectors to the other frame, x and y (2, n).
+        costs: The vectors' costs (n,), the highest first. The first is infinite, for "no vector" (`_carriers`).
+        shape: The frames' (H, W) in pixels.
         t: The time, from 0 at the frame where the vectors start to 1 at the other.
 
     Returns:
-        The vectors (2, h, w) that pass every STEPth pixel, and their costs (h, w), infinite where none passes.
+        For every STEPth pixel, the vector that passes there (2, h, w), and its cost (h, w). Where none passes, the cost
+        is infinite. h = ⌈H / STEP⌉, w = ⌈W / STEP⌉.
     """
     h, w = (-(-n // STEP) for n in shape)
     stopping.check()
@@ -329,10 +352,17 @@ def _carry(
 
 
 def _carriers(side: np.ndarray) -> _Carriers:
-    """Sort vectors by cost, the highest first, from one direction of the result of `found`, (h, w, 3), as _Carriers.
+    """Convert one direction of the result of `found` to _Carriers: a list of vectors by cost, the highest first.
 
-    The first vector is added. It has an infinite cost and stands for no vector. Places count from the corner of
-    the margin of `_carry`.
+    An additional first vector has an infinite cost. It stands for "no vector", so that index 0 can mark places where
+    none arrives.
+
+    Args:
+        side: x, y and cost of the vectors, (h, w, 3).
+
+    Returns:
+        The vectors' starting places and the vectors, (2, h · w + 1) each, in cells of STEP pixels, and their costs.
+        Places include the margin of two cells that `_carry` puts around the picture.
     """
     cost = np.ascontiguousarray(side[..., 2]).ravel()
     # As whole numbers, which NumPy sorts ten times as fast; costs are not negative.
@@ -346,11 +376,11 @@ def _carriers(side: np.ndarray) -> _Carriers:
 
 
 def _filled(vectors: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Fill unknown vectors (h, w, 2) with the mean of known ones around them, by ever coarser copies.
+    """Replace unknown vectors by averages of known vectors around them, from coarser and coarser copies of the field.
 
     Args:
-        vectors: The vectors.
-        known: Which of them are known, (h, w) bool.
+        vectors: The vectors (h, w, 2).
+        known: Which of them are known, (h, w) bool. If all or none are, `vectors` is returned itself.
     """
     if known.all() or not known.any():
         return vectors
@@ -363,19 +393,19 @@ def _filled(vectors: np.ndarray, known: np.ndarray) -> np.ndarray:
 
 
 def _mixed(ends: list[np.ndarray], vectors: np.ndarray, key: int, keys: int) -> np.ndarray:
-    """Return the display values (H, W, C) of a key moment: both frames, looked up along the paths and mixed.
+    """Return the display values (H, W, C) of a key moment, mixed from both frames along its flow vectors.
 
-    Places are whole numbers of 1 / UNIT of a pixel, so that all devices look up the same ones
-    (shaders/include/moment.glsl).
+    Each vector tells where a pixel comes from in the first frame and goes to in the second; both places are looked up.
+    The places are rounded to 1 / UNIT of a pixel, so that shaders look up the same ones (shaders/include/moment.glsl).
 
     Args:
-        ends: The display values of the two frames, from `_encoded`.
-        vectors: Those of the key moment, from Moment.vectors.
-        key: Its number.
-        keys: Into how many parts key moments divide the time between the frames.
+        ends: Display values of the first and the second frame, (H, W, C), from `_encoded`.
+        vectors: The key moment's part of Moment.vectors, (h, w, 4).
+        key: The key moment's number, 1 to keys − 1.
+        keys: Into how many equal parts the key moments divide the time between the frames, a power of two.
 
     Returns:
-        uint16 if frames are whole numbers, else float32.
+        uint16 over the full range if the frames are whole numbers, else float32.
     """
     stopping.check()
     height, width = ends[0].shape[:2]
@@ -394,12 +424,14 @@ def _mixed(ends: list[np.ndarray], vectors: np.ndarray, key: int, keys: int) -> 
 
 
 def _late(sure: np.ndarray, key: int, keys: int) -> np.ndarray:
-    """Return the weight (H, W) of the second frame at a key moment.
+    """Return the weight (H, W) of the second frame in the mix at a key moment, 0 to 1; the first frame has the rest.
+
+    If both show the pixel equally surely, it is key / keys. If one hides it, the other one gets almost all weight.
 
     Args:
-        sure: How surely the first and the second frame show what is at each pixel, (H, W, 2), 0 to 1.
-        key: The key moment's number.
-        keys: Into how many parts key moments divide the time between the frames.
+        sure: (H, W, 2), 0 to 1: how surely the first frame (0) and the second (1) show what is at a pixel.
+        key: The key moment's number, 1 to keys − 1.
+        keys: Into how many equal parts the key moments divide the time between the frames.
     """
     shown = sure + np.float32(0.05)
     late: np.ndarray = np.float32(key) * shown[..., 1]
@@ -407,10 +439,14 @@ def _late(sure: np.ndarray, key: int, keys: int) -> np.ndarray:
 
 
 def _spread(values: np.ndarray, height: int, width: int) -> np.ndarray:
-    """Interpolate values (h, w, C) of every STEPth pixel for all pixels of a picture of this size.
+    """Interpolate values given at every STEPth pixel for all pixels of a picture.
+
+    Args:
+        values: Whole numbers (⌈height / STEP⌉, ⌈width / STEP⌉, C).
+        height, width: The picture's size in pixels.
 
     Returns:
-        int32 (H, W, C): the interpolated values, times STEP².
+        int32 (height, width, C): the interpolated values times STEP², so that no fraction is lost.
     """
     spread = values.astype(np.int32)
     for axis, length in ((0, height), (1, width)):
@@ -422,9 +458,14 @@ def _spread(values: np.ndarray, height: int, width: int) -> np.ndarray:
 
 
 def _cubic(picture: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Return a picture's values (H, W, C) at places (H, W, 2) in 1 / UNIT of a pixel, by cubic interpolation.
+    """Look up a picture at fractional positions, by cubic interpolation. Outside the picture, the edge pixels repeat.
 
-    Beyond the picture, its edge repeats.
+    Args:
+        picture: The values (H, W, C).
+        places: The positions int32 (H, W, 2), x and y, in 1 / UNIT of a pixel.
+
+    Returns:
+        The values at the positions, (H, W, C), of the picture's dtype.
     """
     whole, part = (places >> 5).astype(np.int16), (places & (UNIT - 1)).astype(np.uint16)
     fraction = part[..., 1] << 5 | part[..., 0]  # of OpenCV's table of weights
@@ -432,9 +473,14 @@ def _cubic(picture: np.ndarray, places: np.ndarray) -> np.ndarray:
 
 
 def look(picture: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Return a picture's values at places (h, w, 2), x and y in pixels, by linear interpolation.
+    """Look up a picture at fractional positions, by linear interpolation. Outside the picture, the edge pixels repeat.
 
-    Beyond the picture, its edge repeats.
+    Args:
+        picture: The values (H, W) or (H, W, C).
+        places: The positions float32 (h, w, 2), x and y in pixels.
+
+    Returns:
+        The values at the positions, (h, w) or (h, w, C).
     """
     return cv2.remap(picture, places, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
 
@@ -449,9 +495,16 @@ def grid(height: int, width: int) -> np.ndarray:
 
 
 def _encoded(frame: np.ndarray, transfer: str, alpha: str) -> np.ndarray:
-    """Convert a FrameSource's frame to premultiplied display values: (H, W, 3) if it is opaque, else (H, W, 4).
+    """Convert a source's frame to display values with colors premultiplied by alpha, to be looked up between pixels.
 
-    Opaque display values of whole numbers stay as they are. All others become float32.
+    Args:
+        frame: The frame, (H, W, 4).
+        transfer: The encoding of its samples, as in FrameSource.
+        alpha: Its alpha mode, as in FrameSource.
+
+    Returns:
+        (H, W, 3) if the frame is opaque, else (H, W, 4). Opaque sRGB values of whole numbers stay as they are; all
+        others become float32, with 1 for white.
     """
     if alpha == "opaque" and transfer == "srgb" and frame.dtype.kind == "u":
         return np.ascontiguousarray(frame[..., :3])
@@ -492,13 +545,13 @@ def _table(dtype: np.dtype) -> np.ndarray:
 
 
 def _decoded(frame: np.ndarray, dtype: np.dtype, transfer: str, alpha: str) -> np.ndarray:
-    """Encode linear, premultiplied light (H, W, 3 or 4) as a frame (H, W, 4) of a FrameSource.
+    """Convert linear light to a frame (H, W, 4), encoded as FrameSource.read gives it.
 
     Args:
-        frame: The light.
-        dtype: The frame's dtype.
-        transfer: How the frame's samples are encoded.
-        alpha: The frame's alpha mode.
+        frame: Linear light, premultiplied: (H, W, 3) if opaque, else (H, W, 4).
+        dtype: The dtype of the result.
+        transfer: The encoding of its samples, as in FrameSource.
+        alpha: Its alpha mode, as in FrameSource.
     """
     convert = light.to_encoded if transfer == "srgb" else np.asarray
     if alpha == "opaque":

@@ -16,10 +16,10 @@ KEPT = 256  # pictures that are cached, half a megabyte each
 
 
 class Footage:
-    """Gives tracking small grey pictures of the footage at timeline frames, and tells where cuts are.
+    """Gives tracking small grey pictures of the footage at timeline frames (`picture`), and finds its cuts (`cut`).
 
     Attributes:
-        size: (width, height) of the pictures.
+        size: (width, height) of the pictures in pixels, at most WIDTH on the longer side.
     """
 
     def __init__(self, source: FrameSource, index_at: Callable[[int], int]) -> None:
@@ -67,10 +67,14 @@ class Footage:
         return shots is not None and low != high and high not in shots.around(low, low, high)
 
     def _read(self, frame: int, index: int) -> None:
-        """Read the picture of a timeline frame, and keep it; if tracking goes backward, those of a block of frames.
+        """Read the picture of a timeline frame into the cache (`_kept`), and others with it if they will be asked for.
 
-        `index` is the source frame that the timeline frame shows. Movies are decoded forward, so a block takes
-        little longer than its first frame.
+        If tracking goes backward, pictures of up to BLOCK announced frames (`want`) are read at once, in ascending
+        order. Movies are decoded forward, so this takes little longer than one frame.
+
+        Args:
+            frame: The timeline frame.
+            index: The source frame that it shows.
         """
         before, upcoming = index, list[int]()  # the frame shown before it, and the next ones that are not cached
         if frame in self._wanted:

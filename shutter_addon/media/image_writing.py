@@ -13,16 +13,17 @@ from .rendered_pictures import UNKNOWN, why_short
 
 
 def write_exr(path: Path, values: np.ndarray, names: Sequence[str], note: str = "") -> None:
-    """Write an EXR file.
+    """Write an EXR file, which appears only when it is complete.
 
     Args:
         path: The file.
-        values: (height, width, channels); half floats stay so, all others become float32.
-        names: Of the channels.
-        note: Metadata that tells which edit the picture belongs to (job_file.note), or "".
+        values: (height, width, channels). float16 is written as half floats; any other type is converted to float32.
+        names: The names of the channels, in order.
+        note: The text that says which edit the picture belongs to (job_file.note), stored as "Note" in the metadata.
+            "": none.
 
     Raises:
-        MediaError: It cannot be written.
+        MediaError: The file cannot be written.
     """
     samples = values if values.dtype == np.float16 else np.asarray(values, np.float32)
     # The date is not the time of writing, so that equal samples make equal files.
@@ -40,10 +41,15 @@ def write_grey(path: Path, values: np.ndarray) -> None:
 
 
 def write_levels(path: Path, levels: np.ndarray, description: str) -> None:
-    """Write levels (height, width) uint8 as an 8-bit PNG with a description in its metadata.
+    """Write grey values (height, width) uint8 as an 8-bit PNG.
+
+    Args:
+        path: The file.
+        levels: The grey values, 0 to 255, top row first.
+        description: A text that is stored as "ImageDescription" in the metadata.
 
     Raises:
-        MediaError: It cannot be written.
+        MediaError: The file cannot be written.
     """
     _write(path, levels[..., None], {"ImageDescription": description})
 

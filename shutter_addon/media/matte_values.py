@@ -19,17 +19,21 @@ Late = Callable[[Any, int], None]
 
 
 class MatteValues:
-    """Reads the values of mattes (core.model.mattes.MatteReader) for pictures of one size."""
+    """Computes mattes at any frame, as values for the pixels of pictures of one size (core.model.mattes.MatteReader).
+
+    It opens the mattes' files when they are needed, and remembers the results of the last call of `values`.
+    """
 
     def __init__(self, width: int, height: int, step: int = 1, late: Late | None = None) -> None:
-        """Prepare to read mattes.
+        """Prepare to compute mattes.
 
         Args:
-            width, height: Size of the pictures in pixels.
-            step: Moments per filmed frame (Options.step), more than 1 with Smooth. Each counts as a source frame, but
-                mattes only have filmed frames.
-            late: Called with the file and the frame of each matte that is not tracked to this frame yet. Until it is,
-                its outline moves straight from drawing to drawing. None: track it now, which takes time.
+            width, height: The size of the pictures in pixels.
+            step: Source frames per filmed frame, as in FrameSource.step: more than 1 if moments lie between filmed
+                frames. Mattes have filmed frames only; a moment shows that of the filmed frame before it.
+            late: For previews. Called with a matte's file and a frame number in it if the outline is not tracked to
+                that frame yet, so that tracking can start. Until it is done, the outline moves straight from drawing to
+                drawing. None: track it in `values`, which takes time.
         """
         self._size, self._step, self._late = (width, height), step, late
         self._sources: dict[SourceFile, FrameSource] = {}
@@ -40,12 +44,17 @@ class MatteValues:
         return MatteValues(*self._size, self._step, self._late)
 
     def values(self, mattes: tuple[Matte, ...], index: int, block: int) -> list[tuple[Hashable, np.ndarray]]:
-        """Return a key and the values of each matte in a frame (MatteReader.values).
+        """Return the values of mattes at a frame, each with a key.
 
         Args:
             mattes: The mattes.
-            index: The shown source frame.
-            block: The side of the blocks of pixels that share a value.
+            index: The source frame that is shown. Moments between filmed frames count as source frames.
+            block: The side in pixels of the square blocks that share one value, which is their mean. 1: a value for
+                each pixel.
+
+        Returns:
+            (key, values) for each matte in order. Equal keys mean equal values. Values are float32 (⌈height / block⌉,
+            ⌈width / block⌉), 0 to 1, not yet multiplied by the matte's opacity.
 
         Raises:
             EffectError, MediaError: A file cannot be read.
@@ -80,12 +89,15 @@ class MatteValues:
         return (file, frame, True), straight
 
     def _values(self, matte: Matte, shown: np.ndarray, block: int) -> np.ndarray:
-        """Return the values of a matte for blocks of pixels: those of its content, fitted, feathered and inverted.
+        """Return a matte's values: those of its content, fitted into the picture, feathered, inverted and averaged.
 
         Args:
-            matte: The matte.
-            shown: The values (h, w) of its content, 0 to 1.
-            block: The side of the blocks.
+            matte: The matte, which tells how far to feather and whether to invert.
+            shown: The values of its content at a frame, (h, w) float32, 0 to 1, at any size.
+            block: The side of the blocks of pixels that are averaged.
+
+        Returns:
+            float32 (⌈height / block⌉, ⌈width / block⌉), 0 to 1, for pictures of (width, height).
         """
         values = feathered(fitted(shown, *self._size), matte.feather * self._size[1])
         return block_means(1 - values if matte.invert else values, block)

@@ -39,11 +39,12 @@ _PLANAR_YUV = re.compile(r"yuv[aj]?4\d\dp(\d+le)?")
 
 
 class MovieSource(FrameSource):
-    """A movie, decoded by PyAV. It gives the frames that a movie strip of Blender shows.
+    """A movie, decoded by PyAV. It gives the same frames that a movie strip of Blender shows.
 
-    Frame i is on screen at the stream's start + i / fps: the last one whose time stamp is not later, or the first
-    frame. So frames repeat or are skipped if the rate varies, and the last one repeats while sound goes on. 8-bit
-    movies have uint8 samples, deeper ones uint16 (libswscale keeps 16 bits even of floats), always display values.
+    Frame i is what is on screen i / fps seconds after the stream's start: the last frame whose time stamp is not later,
+    or the first one if all are later. So frames repeat or are skipped if the rate varies, and the last one repeats
+    while the sound goes on. Samples are sRGB display values: uint8 of 8-bit movies, uint16 of deeper ones (even if they
+    are floats).
     """
 
     transfer = "srgb"
@@ -67,7 +68,7 @@ class MovieSource(FrameSource):
             raise
 
     def _probe(self) -> None:
-        """Read the movie's properties from its header and first frame.
+        """Set this source's attributes, such as size, length and dtype, from the movie's header and first frame.
 
         Raises:
             MediaError: Its length is unknown, or no frame can be decoded.
@@ -106,10 +107,11 @@ class MovieSource(FrameSource):
             return self._pixels(frame)
 
     def decoded(self, index: int) -> Decoded:
-        """Return the frame as RGBA (H, W, 4), or as planes of luma and chroma if a GPU can convert these.
+        """Return a frame as RGBA (H, W, 4), or as planes of luma and chroma if a GPU can convert these.
 
-        A GPU can convert 8-bit 4:2:0 planes in BT.601 or BT.709 that need no scaling, rotation or deinterlacing. They
-        are views of the decoder's memory. Converted by their matrix, they equal `read` to the bit.
+        A GPU can convert 8-bit 4:2:0 planes in BT.601 or BT.709 of frames that are neither scaled, rotated nor
+        deinterlaced. Planes are views of the decoder's memory. Converted by their matrix, they equal the result of
+        `read` to the bit.
 
         Raises:
             MediaError: The frame cannot be decoded.
@@ -122,9 +124,11 @@ class MovieSource(FrameSource):
             return Planes(luma=luma, chroma=(cb, cr), matrix=to_rgb, rgba=partial(self._picture, index, frame))
 
     def grey(self, index: int) -> np.ndarray | None:
-        """Return the frame's luma (height, width, 1) as a matte's luminance, or None if the frame has colors.
+        """Return a frame's luma (height, width, 1) if the frame is grey, for mattes: a faster way to its luminance.
 
-        In a frame without colors, luma is the luminance of RGB.
+        Returns:
+            Samples of the source's dtype, over the full range. They equal the luminance of RGB. None: the frame may
+            have colors, because its format has chroma that is not neutral, or is RGB.
         """
         with self._named(index):
             frame = self._frame(index)
@@ -268,17 +272,17 @@ def _interpolate_fields(frame: av.VideoFrame) -> av.VideoFrame:
 
 
 def _blur_rows(picture: np.ndarray, opaque: bool) -> np.ndarray:
-    """Deinterlace a picture of a format whose fields Blender does not interpolate, as Blender does: blur its rows.
+    """Deinterlace a picture by a vertical blur, as Blender does for formats whose fields it does not interpolate.
 
-    The filter is (1 2 1)/4 along columns, from the bottom row upward. The remainder of rounding goes over to the next
-    row. Like Blender, it skips the red of opaque pictures.
+    The filter is (1 2 1) / 4, computed from the bottom row upward. What rounding leaves over is carried to the next
+    row. Like Blender, this leaves the red of opaque pictures unchanged.
 
     Args:
         picture: RGBA (H, W, 4).
         opaque: Whether the movie has no alpha.
 
     Returns:
-        A copy.
+        A blurred copy.
     """
     result = picture.copy()
     rows = result[::-1, :, 1:] if opaque else result[::-1]

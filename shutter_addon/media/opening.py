@@ -33,20 +33,22 @@ def open_source(
     deinterlace: bool = False,
     divisor: int = 1,
 ) -> FrameSource:
-    """Open a movie, or the image sequence that starts with a file.
+    """Open a movie, or the image sequence that starts with a file, as a source of frames.
 
     Args:
-        path: The file.
-        stream: Which of a movie's video streams.
-        files: The file names of an image strip, one for each frame. None: those found beside `path`.
-        colorspace: Blender's name of the strip's color space. None: what Blender assumes for such a file.
-        config: The OpenColorIO configuration, needed for color spaces other than sRGB and Linear Rec.709.
-        alpha: An image strip's alpha mode, "straight" or "premultiplied". None: what Blender assumes.
-        deinterlace: The option of a movie strip.
+        path: The file. With `files`, it may be their folder.
+        stream: Which video stream of a movie, from 0. Cover pictures do not count.
+        files: The file names of an image strip, one for each frame, in the folder of `path`. None: a movie, or images
+            whose names have higher numbers than `path`.
+        colorspace: Blender's name of the color space in which the strip's samples are. None: what Blender assumes for
+            such a file.
+        config: The OpenColorIO configuration file, needed for color spaces other than sRGB and Linear Rec.709.
+        alpha: The alpha mode of images, "straight" or "premultiplied". None: what Blender assumes.
+        deinterlace: Whether to deinterlace a movie, as the option of a movie strip does.
         divisor: The factor by which both sides of frames are reduced, one of reduced.DIVISORS.
 
     Raises:
-        MediaError: It cannot be read.
+        MediaError: The file cannot be read.
     """
     path = Path(path)
     source: FrameSource
@@ -62,7 +64,9 @@ def open_source(
 
 
 def with_proxy(source: FrameSource, path: Path, **how: Any) -> FrameSource:
-    """Return a source that reads the footage's frames from a proxy (a small copy), or the footage if that does not fit.
+    """Return a source that reads footage from a proxy (a small copy made by Blender), so that previews are faster.
+
+    If the proxy is missing, unreadable or unfit (`fits`), return `source` itself.
 
     Args:
         source: The footage.
@@ -100,13 +104,14 @@ def _opened_movie(path: Path, stream: int, deinterlace: bool = False, divisor: i
 
 
 def movie_channel(movie: FrameSource, channel: str) -> FrameSource:
-    """Return a source of one channel of a movie's frames, as samples (height, width, n).
+    """Return a source whose frames are one channel of a movie's frames, samples (height, width, n).
 
-    n is 3 (RGB) for the luminance of colors, 0 for the alpha of an opaque movie, else 1.
+    n is 1 for a color, for alpha, and for the luminance of a grey frame. It is 3 (RGB) for the luminance of a frame
+    that may have colors, and 0 for the alpha of an opaque movie.
 
     Args:
         movie: The movie.
-        channel: A key of sequence.CHANNELS.
+        channel: "luminance", "red", "green", "blue" or "alpha" (sequence.CHANNELS).
     """
     grey_of = getattr(movie, "grey", lambda _index: None)  # BlenderMovie has no `grey`
 
@@ -121,14 +126,16 @@ def movie_channel(movie: FrameSource, channel: str) -> FrameSource:
 
 @dataclass(frozen=True)
 class MatteFile:
-    """A matte file, and which channel of it is the matte (a frame_source.SourceFile).
+    """A matte file and the choice of its channel, hashable (a frame_source.SourceFile). `open` gives its frames.
 
     Attributes:
         path: A movie, a picture, or the first file of an image sequence.
-        channel: luminance, red, green, blue, alpha, or the name of a channel of an EXR.
-        files: The file names of an image strip, one for each frame. None: those found beside `path`.
-        stream: Which of a movie's video streams.
-        stamp: Differs if another file takes its place, so that MatteFiles compare unequal.
+        channel: "luminance", "red", "green", "blue", "alpha", or the name of a channel in an image file.
+        files: The file names of an image strip, one for each frame. None: a movie, or images with numbers from `path`
+            on.
+        stream: Which video stream of a movie, from 0.
+        stamp: Any value that differs after the file has changed, such as its time and size, so that the changed file
+            does not compare equal to the old one. None: changes are not noticed.
     """
 
     path: Path
@@ -138,14 +145,14 @@ class MatteFile:
     stamp: Hashable = None
 
     def open(self) -> SourceWrapper:
-        """Open the source of the matte's values (height, width) float32, 0 … 1, for one thread at a time.
+        """Open a source of the matte's values (height, width) float32, 0 to 1. Only one thread at a time may use it.
 
-        Values are the stored samples: without a transfer function or color space, with alpha neither multiplied nor
-        divided. A movie's range is expanded to 0 … 1, and NaN becomes 0. Luminance has Rec.709's weights. Each frame is
-        a new array.
+        Values are the stored samples, without any conversion of color spaces or alpha. A movie's range is expanded to 0
+        to 1, values outside are clipped, and NaN becomes 0. Luminance has the weights of Rec.709. Each frame is a new
+        array. Any frame number is allowed: it is clamped to the file's frames.
 
         Raises:
-            MediaError: It cannot be read, or has no such channel.
+            MediaError: The file cannot be read, or has no such channel.
         """
         source: FrameSource
         if not _is_movie(self.path, self.files):
@@ -158,9 +165,12 @@ class MatteFile:
 
 
 def _values(samples: np.ndarray) -> np.ndarray:
-    """Return a matte's values (h, w) float32, 0 … 1, for the samples (h, w, n) of a channel.
+    """Convert the samples of a channel to a matte's values (h, w) float32, 0 to 1.
 
-    With n = 3 (RGB) they are the luminance, with n = 0 (the alpha of an opaque file) 1.
+    Args:
+        samples: (h, w, n). n = 1: the channel. n = 3: RGB, whose luminance is wanted. n = 0: the alpha of an opaque
+            file, which is 1. Whole numbers are divided by the largest value of their type; floats are clipped to 0 to
+            1.
     """
     if samples.shape[2] == 0:
         return np.ones(samples.shape[:2], np.float32)

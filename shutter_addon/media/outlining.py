@@ -20,15 +20,16 @@ SPOT = 6.0  # pixels: what covers no more of them is no part of a subject
 
 
 def proposed(picture: np.ndarray, drawn: np.ndarray, *, encloses: bool) -> Curves:
-    """Propose the outline of a subject in a picture.
+    """Propose the outline of a subject in a picture, from strokes on it or from a lasso around it.
 
     Args:
         picture: (H, W, 3) uint8.
-        drawn: The pixels that the user's strokes cover, or that the lasso encloses: (h, w) bool, at a smaller size.
-        encloses: Whether it is a lasso.
+        drawn: (h, w) bool, smaller than the picture: the pixels that the strokes cover, or that the lasso encloses.
+        encloses: True for a lasso, False for strokes.
 
     Returns:
-        Curves (core.model.outlines) around the subject; none if there is no subject.
+        Closed curves around the subject (core.model.outlines): fractions of the picture, y up. Empty: no subject was
+        found.
 
     Raises:
         MediaError: OpenCV is missing.
@@ -50,7 +51,10 @@ def proposed(picture: np.ndarray, drawn: np.ndarray, *, encloses: bool) -> Curve
 
 
 def _along(drawn: np.ndarray) -> np.ndarray:
-    """Return GrabCut's labels (h, w) uint8 for a subject under a stroke: what belongs to it for sure, probably, or not.
+    """Return GrabCut's initial labels (h, w) uint8 for a subject under a stroke.
+
+    Pixels of the stroke are certainly the subject, those close to it probably. Those farther away are probably not the
+    subject, and those beyond the stroke's reach certainly not.
 
     Args:
         drawn: The pixels that the stroke covers, (h, w) bool.
@@ -65,7 +69,10 @@ def _along(drawn: np.ndarray) -> np.ndarray:
 
 
 def _enclosed(drawn: np.ndarray) -> np.ndarray:
-    """Return GrabCut's labels (h, w) uint8 for a subject inside a lasso: what belongs to it for sure, probably, or not.
+    """Return GrabCut's initial labels (h, w) uint8 for a subject inside a lasso.
+
+    Pixels deep inside the lasso are certainly the subject, and all others inside probably. Those in a narrow margin
+    outside are probably not the subject, and those beyond it certainly not.
 
     Args:
         drawn: The pixels that the lasso encloses, (h, w) bool.
@@ -86,14 +93,15 @@ def _extent(drawn: np.ndarray) -> int:
 
 
 def traced(matte: np.ndarray, off: float = 0.5) -> Curves:
-    """Trace the curves around all pixels that a matte covers by more than half.
+    """Trace closed curves around the pixels where a matte is above one half. Spots of at most SPOT pixels are ignored.
 
     Args:
         matte: (height, width) float32, 0 to 1.
-        off: How far curves may be from the exact contours, in pixels.
+        off: The most pixels by which curves may differ from the exact contours, so that they need fewer points.
 
     Returns:
-        Curves (core.model.outlines), the largest first. Holes have curves of their own.
+        Curves (core.model.outlines): fractions of the picture, y up, the one around the largest area first. Holes have
+        curves of their own.
 
     Raises:
         MediaError: OpenCV is missing.

@@ -14,9 +14,9 @@ _PATIENCE = 0.1  # seconds between two looks at whether a frame is still wanted
 
 
 class PrefetchSource(SourceWrapper):
-    """A source around another one, which decodes that one's frames ahead on a thread. Its frames are read-only.
+    """A wrapper around a source that decodes the frames announced by `want` ahead of time, on a thread of its own.
 
-    Which frames, `want` tells. Decoded ones stay in memory until the next `want` without them.
+    A decoded frame stays in memory until a call of `want` no longer names it. Arrays of frames are read-only.
     """
 
     def __init__(self, source: FrameSource, *, planes: bool = False) -> None:
@@ -24,7 +24,8 @@ class PrefetchSource(SourceWrapper):
 
         Args:
             source: The source.
-            planes: Whether to decode by its `decoded`, so that frames may be planes, which `read` then has to convert.
+            planes: Whether the thread calls the source's `decoded` in place of `read`. Frames may then be planes of
+                luma and chroma (frame_source.Planes), which `decoded` returns and `read` converts to RGBA.
         """
         super().__init__(source)
         self._fetch = source.decoded if planes else source.read
@@ -44,15 +45,15 @@ class PrefetchSource(SourceWrapper):
             self._wake()
 
     def read(self, index: int) -> np.ndarray:
-        """Return the source's frame (height, width, 4), read-only.
+        """Return the source's frame (height, width, 4), read-only. Wait for it if it is not decoded yet.
 
-        A frame that is not decoded yet is decoded before all announced ones. Errors of the source are raised once; the
-        next call decodes the frame again.
+        A frame that is waited for is decoded before those announced by `want`. If the source fails to decode a frame,
+        the error is raised here, and a later call tries again.
 
         Raises:
-            MediaError: The source cannot read it, or `close` was called meanwhile.
-            core.stopping.StoppedError: The frame is no longer wanted; or it is not decoded yet, and this step may not
-                wait (stopping.waits).
+            MediaError: The source cannot read the frame, or `close` was called while this waited.
+            core.stopping.StoppedError: The caller's work was cancelled (stopping.once). Or the frame is not decoded
+                yet, and the caller must not wait for it (stopping.waits): it is then decoded for the next call.
         """
         picture = as_rgba(self.decoded(index))
         picture.flags.writeable = False

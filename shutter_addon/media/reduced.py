@@ -19,7 +19,8 @@ def smaller(source: FrameSource, divisor: int) -> FrameSource:
 
     Args:
         source: The footage.
-        divisor: The squares' side. The width and height are divided by it and rounded up. 1: return `source` itself.
+        divisor: The side of the squares in pixels. Frames have the footage's width and height divided by it, rounded
+            up. 1: return `source` itself.
     """
     if divisor == 1:
         return source
@@ -34,14 +35,15 @@ def reduced_size(length: int, divisor: int) -> int:
 
 
 def reduced(frame: np.ndarray, divisor: int, alpha: str) -> np.ndarray:
-    """Return a frame (height, width, 4) reduced by averaging squares of pixels, in its own dtype.
+    """Return a frame, in its own dtype, reduced by averaging squares of pixels.
 
-    Where a square goes beyond the edge, the last pixels are repeated.
+    The result is (⌈height / divisor⌉, ⌈width / divisor⌉, 4). Squares that extend beyond the right or bottom edge repeat
+    the pixels there.
 
     Args:
-        frame: The frame.
-        divisor: The squares' side.
-        alpha: As in FrameSource; straight colors are weighted with their alpha.
+        frame: The frame, (height, width, 4).
+        divisor: The side of the squares in pixels. 1: return `frame` itself.
+        alpha: The frame's alpha mode, as in FrameSource. Straight colors are averaged with alpha as the weight.
     """
     if divisor == 1:
         return frame
@@ -79,7 +81,9 @@ class ProxySource(SourceWrapper):
         source.close()  # a read opens it again
 
     def read(self, index: int) -> np.ndarray:
-        """Return the frame (height, width, 4) of the proxy, or of the footage if the proxy lacks it.
+        """Return the proxy's frame, converted to the size and samples of the footage, (height, width, 4).
+
+        If the proxy's frame is missing or damaged, return the footage's.
 
         Raises:
             MediaError: The footage cannot be read, either.
@@ -115,9 +119,11 @@ class ProxySource(SourceWrapper):
 
 
 def fits(proxy: FrameSource, source: FrameSource) -> bool:
-    """Return whether a proxy can replace footage: same length and orientation, both opaque, in bytes or half floats.
+    """Return whether a proxy can replace footage, which it must do frame by frame.
 
-    Blender's proxies of float images are EXR files named .jpg, with sRGB values. A proxy of another size needs OpenCV.
+    It has to have the same number of frames, the same aspect within STRETCHED, and no alpha, like the footage. It must
+    have samples that can be converted (uint8 or float16, as the sRGB EXRs that Blender names .jpg for float footage),
+    or have the footage's dtype and transfer. If its size differs from the footage's, OpenCV must be there.
 
     Args:
         proxy: The opened proxy.

@@ -24,10 +24,11 @@ class RenderedPicture(NamedTuple):
     """The properties of a rendered picture.
 
     Attributes:
-        size: (width, height).
-        channels: Their number.
-        samples: Their type, such as "uint16".
-        edit: The key of the edit's version that marks the picture (core.farm.job_file), or None.
+        size: (width, height) in pixels.
+        channels: The number of channels.
+        samples: The type of samples as OpenImageIO names it, such as "uint16".
+        edit: The key of the version of the edit that the picture is from (job_file.key_in), found in its metadata.
+            None: it has none.
     """
 
     size: tuple[int, int]
@@ -37,14 +38,17 @@ class RenderedPicture(NamedTuple):
 
 
 def read(path: Path, edit: str | None = None) -> RenderedPicture | None:
-    """Return the properties of a PNG or EXR file, or None if it is missing or damaged.
+    """Return the properties of a PNG or EXR file, if it exists and is complete.
 
-    A PNG's checksums are compared. An EXR is decoded: ZIP and ZIPS have checksums. With other codecs, only missing data
-    and errors of decoding are found.
+    A PNG is checked by its checksums. An EXR is decoded, which finds missing data; damaged data are found with
+    certainty only with ZIP and ZIPS compression, which have checksums.
 
     Args:
         path: The file.
-        edit: The key of an edit's version (core.farm.job_file). Pictures of other edits give None, and are not decoded.
+        edit: The key of the edit's version that the picture must be from. None: any.
+
+    Returns:
+        The properties. None: the file is missing, damaged or from another version of the edit.
     """
     image = ImageInput.open(check_name(path)) if path.is_file() else None
     if image is None:

@@ -37,20 +37,20 @@ Layer = tuple[ImageSpec, list[int]]  # the spec of a part of an image, and posit
 
 
 class SequenceSource(FrameSource):
-    """An image sequence or image as a source: all colors of its files, or one channel of them.
+    """An image sequence or a single image as a source: the colors of its files or, with `channel`, one channel of them.
 
-    With `files` (an image strip's list), frame i is files[i]. Else files are found beside the first one, and frame i is
-    the file whose number is i higher. If a number is missing, the file before it is repeated. If more than MISSING are
-    missing in a row, the sequence ends, and `left_out` tells so.
+    With `files` (an image strip's list), frame i is files[i]. Otherwise files are found beside the first one: frame i
+    is the file whose number is i higher. If that is missing, the file with the next lower number is repeated. The
+    sequence ends where more than MISSING numbers in a row are missing; `left_out` then tells so.
 
-    As in Blender, samples are not changed: straight alpha stays straight, EXIF orientation is ignored, and the picture
-    of an EXR is its data window. All frames must have the first one's size and sample type. The source has alpha if any
-    frame has.
+    As in Blender, samples are not converted: straight alpha stays straight, and EXIF orientation is ignored. The
+    picture of an EXR is its data window. All frames must have the size and sample type of the first one. The source has
+    alpha if any frame has it.
 
-    The frames of a channel are its stored samples (height, width, n) of any type: n is 3 (RGB) for the luminance of
-    colors, 0 for the alpha of an opaque image, else 1. An EXR's picture is then its display window, 0 outside its data
-    window, because mattes are often cropped to what they cover. If the data window is larger on all sides, it is the
-    picture, as in Blender.
+    With `channel`, frames are stored samples (height, width, n), of a type that may differ from frame to frame. n is 3
+    (RGB) for the luminance of colors, 0 for the alpha of an opaque image, else 1. The picture of an EXR is then its
+    display window, with 0 outside its data window, because mattes are often cropped to what they cover. If the data
+    window contains the display window, it is the picture instead.
     """
 
     fps = None
@@ -63,16 +63,17 @@ class SequenceSource(FrameSource):
         alpha: str | None = None,
         channel: str | None = None,
     ) -> None:
-        """Find the files, and read the first one's header.
+        """Find the files, and read the header of the first one.
 
         Args:
-            path: The first file.
-            files: An image strip's list of file names. None: files are found beside `path`.
-            alpha: As for opening.open_source.
-            channel: A key of CHANNELS, or a channel's name in the files. None: all colors.
+            path: The first file. With `files`, it may be their folder.
+            files: An image strip's list of file names, in the folder of `path`. None: files are found beside `path`.
+            alpha: The alpha mode of files that have alpha, "straight" or "premultiplied". None: what Blender assumes.
+            channel: A key of CHANNELS, or the name of a channel in the files. None: all colors.
 
         Raises:
-            MediaError: The first file cannot be read or has no such channel, or its folder cannot be listed.
+            MediaError: The first file cannot be read or has no such channel, its folder cannot be listed, or `files` is
+                empty.
         """
         path = Path(path)
         if files is None:
@@ -103,10 +104,11 @@ class SequenceSource(FrameSource):
         self.options = {}
 
     def read(self, index: int) -> np.ndarray:
-        """Return a frame as RGBA (height, width, 4), or the samples (height, width, n) of the channel.
+        """Return a frame as RGBA (height, width, 4), or the samples (height, width, n) of `channel` if one was chosen.
 
         Raises:
-            MediaError: The file is missing, damaged or unlike the first.
+            MediaError: The file is missing or damaged, or its size (without `channel` also its sample type) is not the
+                first's.
             IndexError: There is no such frame.
         """
         check_index(self, index)
@@ -149,12 +151,13 @@ def expanded(samples: np.ndarray) -> np.ndarray:
 
 
 def _in_window(samples: np.ndarray, spec: ImageSpec, window: Window) -> np.ndarray:
-    """Return an image's samples (height, width, n) in a window, 0 outside the image.
+    """Cut an image's samples (height, width, n) to a window, with 0 wherever the window extends beyond the image.
 
     Args:
-        samples: Those of the image's data window.
-        spec: The image's header.
-        window: x, y, width and height in the image's coordinates.
+        samples: The samples of the image's data window.
+        spec: The image's header, which tells where that window lies.
+        window: x, y, width and height of the window in the image's coordinates. If it is the data window, `samples` is
+            returned itself.
     """
     x, y, width, height = window
     if window == (spec.x, spec.y, spec.width, spec.height):
@@ -176,10 +179,16 @@ def sequence_files(path: Path) -> list[Path]:
 
 
 def _numbered(path: Path) -> tuple[dict[int, Path], Path | None]:
-    """Find the files of the image sequence that starts with a file.
+    """Find the files of the image sequence that starts with a file, by the numbers in their names.
+
+    The sequence ends before a gap of more than MISSING numbers, and has at most LONGEST frames.
 
     Returns:
-        {frame from 0: file}, without missing frames; and the first file after a gap that ends the sequence, or None.
+        {difference of a file's number from the first one's: file}, ascending, beginning with 0. And the first file
+        beyond the sequence's end, or None if there is no such file.
+
+    Raises:
+        MediaError: The folder cannot be listed.
     """
     parts, alike = _frame_number(path)
     if parts is None:
@@ -199,7 +208,9 @@ def _numbered(path: Path) -> tuple[dict[int, Path], Path | None]:
 
 
 def numbered_alike(path: Path) -> list[Path]:
-    """Return the sorted files of a folder whose names differ from a file's at most in the frame number.
+    """Return the files of a folder whose names differ from a file's at most in the frame number, sorted.
+
+    The file is included if it exists. A name without a number gives just the file.
 
     Raises:
         MediaError: The folder cannot be listed.
@@ -208,13 +219,17 @@ def numbered_alike(path: Path) -> list[Path]:
 
 
 def _frame_number(path: Path) -> tuple[_Parts | None, list[Path]]:
-    """Find the frame number in a file's name.
+    """Find out which number in a file's name is that of the frame.
 
-    It is the last number that varies among the files of the folder; a version (v3) counts only if no other varies. If
-    none varies, it is the last number.
+    It is the last number in which files of the folder differ. A version (such as v3) is taken only if they differ in no
+    other number. If they differ in none, it is the last number.
 
     Returns:
-        The name's parts around the number, or None without any; and the files of the folder that differ only there.
+        The stem before the number, the number's digits, and the stem after them; None: the name has no number. And the
+        files of the folder whose names differ only in this number, the file itself included.
+
+    Raises:
+        MediaError: The folder cannot be listed.
     """
     numbers = _numbers(path.stem)
     if not numbers:
@@ -239,12 +254,18 @@ def _numbers(stem: str) -> list[_Parts]:
 
 
 def by_number(path: Path, *, listed: bool = False) -> Callable[[int], Path] | None:
-    """Return a function of i that gives the path whose number is i higher than that of a file. None: it has no number.
+    """Return a function that returns the path of the sequence's file for a number i, whether or not the file exists.
+
+    The file's number is that of `path` plus i, with at least as many digits. Return None if `path` has no number in its
+    name.
 
     Args:
-        path: The file.
-        listed: Whether the other files of the folder decide which number is that of the frame (MediaError: it cannot be
-            listed). Otherwise it is the last one, as in Blender's movie clips.
+        path: A file of the sequence.
+        listed: Whether to find the number of the frame by comparing the folder's files (`_frame_number`). False: it is
+            the last number in the name, as in Blender's movie clips.
+
+    Raises:
+        MediaError: The folder cannot be listed (`listed` only).
     """
     parts = _frame_number(path)[0] if listed else next(iter(_numbers(path.stem)), None)
     if parts is None:
@@ -279,10 +300,17 @@ def _parts(image: ImageInput) -> Iterator[ImageSpec]:
 
 
 def _first_colours(image: ImageInput, path: Path) -> Layer:
-    """Return the channels of an image that Blender shows: their part and positions.
+    """Find the channels of an image that Blender shows.
+
+    Args:
+        image: The opened file. It is left at the part that has these channels.
+        path: The file, for messages.
+
+    Returns:
+        The header of the part (an EXR may have several), and the positions of the channels in it, in the order RGBA.
 
     Raises:
-        MediaError: It has no colors.
+        MediaError: The image has no channels of colors, or an EXR's parts have different data windows.
     """
     spec = whole = image.spec()
     if image.format_name() != "openexr":
@@ -302,15 +330,16 @@ def _channel_named(channel: str, image: ImageInput, path: Path) -> Layer:
     """Find the channels of an image that a channel's name stands for.
 
     "luminance" stands for all colors, and "alpha" for no channel if the image is opaque. If an EXR has a channel of
-    exactly this name, only that one counts: files of coefficients name channels after shutters, which may be "red".
+    exactly this name, that one is meant: the extension's own EXRs name channels after shutters, and one of them may be
+    "red".
 
     Args:
         channel: A key of CHANNELS, or the name of a channel in the file.
-        image: The opened file.
+        image: The opened file. It is left at the part that has these channels.
         path: The file, for messages.
 
     Returns:
-        The part of the file that has the channels, and their positions there.
+        The header of that part, and the positions of the channels in it.
 
     Raises:
         MediaError: The image has no such channel.
@@ -331,10 +360,14 @@ def _channel_named(channel: str, image: ImageInput, path: Path) -> Layer:
 
 
 def _colour_channels(names: Iterable[str]) -> list[int]:
-    """Return the positions of the channels that Blender shows of an EXR, by the names of all its channels.
+    """Return which channels of a part of an EXR Blender shows, as positions, in the order RGB, XYZ or Y, then alpha.
 
-    They belong to the first layer, and there to no pass or to "Combined" rather than to other passes. RGB comes before
-    XYZ, and XYZ before grey.
+    Channels of RGB are preferred to XYZ, and these to grey (COLOURS). Among several of one kind, those of the first
+    layer win, and in it those without a pass or of the pass "Combined". If there are no such channels, the list is
+    empty.
+
+    Args:
+        names: The names of all its channels, such as "layer.pass.R".
     """
     passes: dict[str, dict[str, int]] = {}
     for position, name in enumerate(names):
@@ -359,18 +392,18 @@ def _rank(place: str) -> tuple[str, bool, str]:
 def _opened(
     path: Path, layer_of: Callable[[ImageInput, Path], Layer] = _first_colours
 ) -> Iterator[tuple[ImageInput, ImageSpec, list[int]]]:
-    """Open an image, and close it at the end of the context.
+    """Open an image, find the channels that are wanted, and close the image at the end of the context.
 
     Args:
         path: The file.
-        layer_of: Chooses the channels that are wanted, and their part of the image.
+        layer_of: Returns the wanted channels of the opened image: the header of their part, and their positions in it.
 
     Yields:
-        The open image, the header of the part, and the positions of the channels: those of Y, YA, RGB or RGBA, or of a
-        single channel.
+        The opened image; the header of the part; and the channels' positions: those of Y, YA, RGB or RGBA, or of one
+        chosen channel. None of them (an empty list) for the alpha of an opaque image.
 
     Raises:
-        MediaError: It cannot be read.
+        MediaError: The image cannot be read.
     """
     wishes = ImageSpec()
     wishes.attribute("oiio:UnassociatedAlpha", 1)  # no premultiplication on reading
@@ -394,16 +427,16 @@ def _dtype(spec: ImageSpec) -> np.dtype:
 
 
 def _samples(image: ImageInput, spec: ImageSpec, layer: list[int], path: Path) -> np.ndarray:
-    """Read the samples (height, width, channels) of some channels of an opened image.
+    """Read some channels of an opened image, as samples (height, width, channels).
 
     Args:
-        image: The image, at the wanted part.
-        spec: The part's header.
-        layer: The channels' positions.
-        path: The file, for errors.
+        image: The image, with the wanted part selected (seek_subimage).
+        spec: The header of that part.
+        layer: The positions of the channels, in the order wanted.
+        path: The file, for messages.
 
     Raises:
-        MediaError: They cannot be decoded.
+        MediaError: The samples cannot be decoded.
     """
     kind = str(spec.format) if str(spec.format) in SAMPLES else "float"
     first, stop = min(layer), max(layer) + 1
