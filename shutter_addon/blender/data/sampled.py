@@ -188,14 +188,19 @@ class Sampling:
         return sampling.over(keyed, keyframes.SourceTime(numbers, keys).at, keys)
 
     def drawings(self, index: int, every: bool = False, layer_name: str = "layer") -> model.Drawings:
-        """Return a region's strokes over time: those drawn at some frames, and how they go on to the next drawing.
+        """Return what is drawn in one annotation layer of a region over time, at all frames that have a drawing.
 
-        The keys of the region's location say how: their ease counts from each drawing to the next.
+        A drawing is the list of strokes at one timeline frame. Between two drawings the strokes change from one to the
+        other. A key of the region's location on a drawing's frame says how, by its ease; without one it is linear.
 
         Args:
-            index: Of the region.
-            every: Read the strokes of all drawings, not only of those that the sampled frames need.
-            layer_name: Which of the region's annotation layers, one of annotations.LAYERS.
+            index: Index of the region in the effect.
+            every: True: read the strokes of all drawings. False: only of those at or around a sampled frame; the
+                strokes of the others are None.
+            layer_name: Which layer of the region, one of annotations.LAYERS.
+
+        Returns:
+            The drawings; without any if the region has no such layer.
         """
         region, path = self.effect.regions[index], f"{self.path}.regions[{index}]"
         width, height = annotations.picture_size(self.effect)
@@ -217,11 +222,16 @@ class Sampling:
         )
 
     def _origins(self, region: PropertyGroup, path: str, numbers: tuple[int, ...]) -> tuple[Placement, ...]:
-        """Return where the region was when its drawing at each of these frames was made; (): drawings do not note it.
+        """Return how the region was moved when each of its drawings was made, to lay drawings where they were drawn.
 
         Args:
+            region: The region.
             path: Data path of the region from the scene.
             numbers: Timeline frames of the drawings.
+
+        Returns:
+            A placement for each drawing: the one stored with it, else that of the region's keys at the drawing's frame.
+            () if none is stored for any drawing, or for outlines, subjects and mattes: the region counts as unmoved.
         """
         if not region.drawn or region.kind in strips.LAID:
             return ()

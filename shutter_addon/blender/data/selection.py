@@ -32,8 +32,11 @@ def active_strip(context: Context) -> Any:
 def active(context: Context) -> Any:
     """Return (scene, effect, effect strip) that panels show and operators change; None: there is none.
 
-    It is the effect of the active strip: an effect strip, a baked strip or a source. If that strip is not selected, the
-    effect in the preview (`seen`) comes first. Without an active strip, only the preview counts.
+    - No strip is active: the effect strip in the preview (`seen`) is returned.
+    - The active strip is a baked strip, or an effect strip that was baked: that effect and its effect strip.
+    - It is an effect strip or the source of effects: the strip in the preview, if that shows one of these effects, or
+      if the active strip is not selected. Otherwise the active strip or, for a source, the nearest that uses it.
+    - It is any other strip: None.
     """
     scene, strip = scene_of(context), active_strip(context)
     if strip is not None and (baked := _baked_part(scene, strip)) is not None:
@@ -58,7 +61,7 @@ def in_picture(context: Context) -> Any:
 def seen(scene: Scene) -> Any:
     """Return (scene, effect, effect strip) that previews of a scene show at the playhead; None: no effect is there.
 
-    Of several, the active strip counts first, then one whose source is the active strip, then the highest channel.
+    Of several effect strips, take the active one, else one whose source is the active strip, else the highest channel.
     """
     scene_strips = [strip for strip in visible(scene) if strip.type == "SCENE" and strip.scene]
     shown = [(strip, effect) for strip in scene_strips if (effect := effect_of(scene, strip.scene))]
@@ -71,9 +74,9 @@ def seen(scene: Scene) -> Any:
 
 
 def visible(scene: Scene) -> list:
-    """Return the strips at the playhead that have a picture and are not muted.
+    """Return the strips at the playhead that have a picture and are not muted, nor their channel.
 
-    Inside an open meta strip, only its strips count.
+    If a meta strip is open, these are strips inside it only.
     """
     editor, frame = scene and scene.sequence_editor, scene and scene.frame_current
     if not editor:
@@ -105,9 +108,10 @@ def _effects_of(scene: Scene, strip: Strip | None) -> list:
 
 
 def _baked_part(scene: Scene, strip: Strip) -> Any:
-    """Return (scene, effect, effect strip) for a baked strip or an effect strip that was baked; None: it is neither.
+    """Return (scene, effect, effect strip) of the bake that a strip belongs to; None: the strip is no part of a bake.
 
-    Copies of a bake share its identity; of several effect strips, one that overlaps the strip in time counts.
+    A bake consists of the effect strip and the baked strip that replaces it. Copies of them share the bake's identity.
+    Of several effect strips, `strip` itself comes first, then one that overlaps it in time, then any.
     """
     parts = [part for part in of_bake(scene, strip) if part.type == "SCENE" and part.scene]
     parts.sort(key=lambda part: (part != strip, not strips.overlap(part, strip)))
@@ -136,9 +140,9 @@ def effect_of_item(item: PropertyGroup) -> PropertyGroup:
 
 
 def moving(effect: PropertyGroup, index: int | None) -> PropertyGroup:
-    """Return the region with this index, or the effect's camera for None. Both have the same properties of motion.
+    """Return what moves: the effect's region with this index or, for None, its camera.
 
-    Functions that work on either take such an index.
+    Both have the same properties of motion (location, rotation, scale), so functions that work on either take an index.
     """
     return effect.camera if index is None else effect.regions[index]
 
@@ -163,14 +167,14 @@ def active_region(effect: PropertyGroup) -> Any:
 
 @dataclass(frozen=True)
 class Target:
-    """A region or the camera that work over several steps is done on, such as tracking, found again before each step.
+    """What a longer task such as tracking works on: a region or the camera, found again before each step of the task.
 
-    A reference would not do, because Blender's data may be moved or removed meanwhile.
+    A reference to it would not do, because Blender's data may be moved in memory or removed between two steps.
 
     Attributes:
         scene: session_uid of the effect scene.
-        index: Of the region; None: the camera.
-        known: What is compared to notice that another region has taken this index.
+        index: Index of the region in the effect; None: the camera.
+        known: State of the data when the task began, from _known. If it differs later, the target is given up.
     """
 
     scene: int
@@ -182,10 +186,11 @@ class Target:
         return cls(effect.scene.session_uid, index, cls._known(effect, index))
 
     def effect(self) -> PropertyGroup | None:
-        """Return the effect.
+        """Return the effect that has the target, looked up in Blender's data.
 
         Returns:
-            None if it is gone or was moved in time, if undo replaced it, or if another region has the index now.
+            None if the effect was removed or moved in time, if undo or loading replaced Blender's data, or if another
+            region has the index now.
         """
         effects = (effect for scene in bpy.data.scenes for effect in scene.virtual_shutter.effects if effect.scene)
         effect = next((effect for effect in effects if effect.scene.session_uid == self.scene), None)

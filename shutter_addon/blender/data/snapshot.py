@@ -35,14 +35,16 @@ class Snapshot:
 
     Attributes:
         scene: session_uid of the effect scene.
-        origin: Timeline frame at which the effect scene's frame 0 would be shown.
+        origin: Timeline frame that corresponds to frame 0 of the effect scene.
         first: First timeline frame of the strip.
-        film: Frame step and last frame of the scene whose sequencer is rendered.
-        frames: Timeline frames at which keyed properties were sampled.
-        effect: Shutters, regions and options.
+        film: Frame step and last frame of a render, from the scene that has the strip.
+        frames: Timeline frames for which pictures can be made.
+        effect: The effect, with values over time for these frames.
         source: The footage, and how it is read.
-        timing: Which frame of the footage is shown when; None: the effect's *Custom Time* says so.
-        blended: Color space in which the sequencer blends the strip with those below; "": it does not blend it.
+        timing: The source strip's timing: which frame of the footage it shows when. None if the effect's *Custom Time*
+            (effect.time) says so instead.
+        blended: Color space in which the sequencer blends the strip with those below. "" if it does not blend it: the
+            strip replaces them, or its source is muted.
         folder: Folder of the .blend file; None: it was never saved.
     """
 
@@ -67,7 +69,9 @@ def take(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames) -> S
 
     Args:
         scene: The scene that has the strip.
-        frames: Timeline frames that pictures will be made at.
+        effect: The effect that the strip shows.
+        strip: The effect strip.
+        frames: Timeline frames for which pictures will be made.
 
     Raises:
         EffectError, MediaError: There is no source, or the effect cannot be shown at any frame.
@@ -90,7 +94,13 @@ def take(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames) -> S
 def read(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames) -> model.Effect:
     """Return an effect as the model has it, with keyed properties sampled at timeline frames.
 
-    What is wrong at one frame only is raised when that frame's values are asked for.
+    An error that concerns only one frame is raised later, when that frame's values are asked for.
+
+    Args:
+        scene: The scene that has the strip.
+        effect: The effect that the strip shows.
+        strip: The effect strip.
+        frames: Timeline frames for which the effect will be asked.
 
     Raises:
         EffectError, MediaError: It has no shutter, too many shutters or regions, or a matte without content.
@@ -122,9 +132,15 @@ def read(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames) -> m
 
 
 def _around(effect: PropertyGroup, frames: Frames, has_layers: bool) -> Frames:
-    """Return the timeline frames at which motions are sampled: `frames`, and as many around each as are needed.
+    """Return the timeline frames at which motions and *Custom Time* are sampled: `frames`, with more around if needed.
 
-    They are needed where an exposure follows a motion, or other frames fill what layers cover.
+    Frames around are needed if an exposure follows a motion, if its length is *Timeline*, or if layers are filled from
+    other frames.
+
+    Args:
+        effect: The effect.
+        frames: Timeline frames for which pictures will be made.
+        has_layers: Whether a region of the effect is a layer.
     """
     if has_layers or any(shutter.follow != "NOTHING" for shutter in effect.shutters):
         smooth = max(validation.number(shutter, "follow_smooth") for shutter in effect.shutters)
@@ -139,10 +155,15 @@ def _around(effect: PropertyGroup, frames: Frames, has_layers: bool) -> Frames:
 
 
 def _followed(shutter: PropertyGroup, regions: Sequence[model.AnyRegion], camera: model.Camera) -> model.Subject | None:
-    """Return what a shutter's exposure moves with: a region, the camera, or None.
+    """Return the region or the camera that a shutter's exposure moves with; None: it follows nothing.
+
+    Args:
+        shutter: The shutter's property group.
+        regions: The effect's regions, as the model has them, among which the followed one is found by its name.
+        camera: The effect's camera, as the model has it.
 
     Raises:
-        EffectError: It is to follow a region that does not exist.
+        EffectError: The shutter is to follow a region that is not among them.
     """
     follow = validation.word(shutter, "follow")
     if follow == "NOTHING":
@@ -157,13 +178,19 @@ def _followed(shutter: PropertyGroup, regions: Sequence[model.AnyRegion], camera
 
 
 def bars_at(scene: Scene, effect: PropertyGroup, index: int, frame: float) -> np.ndarray:
-    """Return a shutter's bars (how much each frame counts, (L,)) at a timeline frame, interpolated between keys.
+    """Return a shutter's bars at a timeline frame, interpolated between keys.
 
     Args:
-        index: Of the shutter.
+        scene: The scene that has the effect.
+        effect: The effect.
+        index: Index of the shutter in the effect.
+        frame: The timeline frame.
+
+    Returns:
+        (L,): how much each of the window's L frames counts in the exposure.
 
     Raises:
-        EffectError: A bar is out of range, or they are not as many as the window is long.
+        EffectError: A bar is out of range, or the number of bars differs from the window's length.
     """
     sampling = Sampling.of(scene, effect, None, (frame,))
     options = _options(sampling)
@@ -171,15 +198,15 @@ def bars_at(scene: Scene, effect: PropertyGroup, index: int, frame: float) -> np
 
 
 def strokes_at(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, frame: float) -> list[np.ndarray]:
-    """Return a region's strokes (n, 2) at a timeline frame, in fractions of the picture, before the region's motion.
+    """Return a region's strokes at a timeline frame, each as points (n, 2) in fractions of the picture.
 
-    A matte or ramp has none.
+    The region's motion (its location, rotation and scale) is not applied. A matte or ramp has no strokes.
 
     Args:
-        index: Of the region.
+        index: Index of the region in the effect.
 
     Raises:
-        EffectError: They lie far outside the picture.
+        EffectError: A stroke is beyond limits.MAX_DISTANCE.
     """
     if effect.regions[index].kind in strips.MATTES:
         return []
@@ -190,14 +217,16 @@ def strokes_at(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, fr
 def region_at(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, frames: Frames) -> Any:
     """Return a region as plain data, sampled at timeline frames, for tracking and drawing.
 
-    An outline is given as a lasso region of its curves, a subject as a line region of its strokes. An error that
-    concerns only one frame is raised later, when that frame's values are read.
+    An error that concerns only one frame is raised later, when that frame's values are read.
 
     Args:
-        index: Of the region.
+        index: Index of the region in the effect.
+        frames: The timeline frames.
 
     Returns:
-        A Region, or for a matte or ramp a MatteRegion.
+        A MatteRegion for a matte or ramp, else a Region. An outline is given as a "lasso", with its curves as
+        strokes; a subject as a "line", with the strokes that mark it or, without any, its outlines. The shutter is
+        always 0, not the region's own.
     """
     read_region = _region if effect.regions[index].kind in strips.OUTLINED else _any_region
     return read_region(Sampling.of(scene, effect, strip, frames), index, 0)
@@ -209,14 +238,15 @@ def carried_outline(
     """Return what is needed to read the mattes of a subject, or of an outline that is tracked between drawings.
 
     Args:
-        index: Of the region.
+        index: Index of the region in the effect.
         frames: Timeline frames.
 
     Returns:
-        The CarriedFile that makes the mattes, and the frame of the footage, from 0, that each timeline frame shows.
+        The CarriedFile that makes the mattes, one for each frame of the footage. And by timeline frame, the number
+        (from 0) of the frame of the footage that is shown there.
 
     Raises:
-        EffectError, MediaError: The outline is interpolated instead of tracked, or has no source.
+        EffectError, MediaError: The outline is not tracked (*Linear*), or the effect has no source.
     """
     sampling = Sampling.of(scene, effect, strip, frames)
     _curves, file = _drawn(sampling, index)
@@ -227,7 +257,10 @@ def carried_outline(
 
 
 def source_frames(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames) -> dict[float, int]:
-    """Return which frame of the source's footage, from 0, each of these timeline frames shows.
+    """Return which frame of the source's footage is shown at each timeline frame.
+
+    Returns:
+        By timeline frame, the number of the frame of the footage, from 0.
 
     Raises:
         EffectError, MediaError: The effect has no source strip, or its movie cannot be read.
@@ -266,11 +299,14 @@ def _options(sampling: Sampling) -> keyframes.Channel:
 
 
 def _shutter(sampling: Sampling, index: int, options: keyframes.Channel) -> model.Shutter:
-    """Return a shutter as the model has it, except for what its exposure follows.
+    """Return a shutter as the model has it, but with no followed region or camera, which `read` adds.
+
+    If its bars cannot be read, the error is raised when they are asked for.
 
     Args:
-        index: Of the shutter.
-        options: The effect's options over time, which give the window's length.
+        sampling: Reads the effect.
+        index: Index of the shutter in the effect.
+        options: Channel of the effect's options, which give the window's length.
     """
     path, shutter = f"{sampling.path}.shutters[{index}]", sampling.effect.shutters[index]
     bars = sampled.tried(_bars, sampling, path, shutter, options)
@@ -283,14 +319,18 @@ def _shutter(sampling: Sampling, index: int, options: keyframes.Channel) -> mode
 
 
 def _bars(sampling: Sampling, path: str, shutter: PropertyGroup, options: keyframes.Channel) -> keyframes.Bars:
-    """Return a shutter's bars (how much each frame counts) over time.
+    """Return a shutter's bars (how much each frame of its window counts) over time.
+
+    If a bar is out of range at a frame, the error is raised when the bars at that frame are asked for.
 
     Args:
+        sampling: Reads the effect.
         path: Data path of the shutter from the scene.
-        options: The effect's options over time, which give the window's length.
+        shutter: The shutter.
+        options: Channel of the effect's options, which give the window's length.
 
     Raises:
-        EffectError: The bars are not as many as the window is long.
+        EffectError: The number of bars differs from the window's length.
     """
     curves, frames, stored = sampling.curves, sampling.frames, [bar.weight for bar in shutter.bars]
     keyed = {i: curve for i in range(len(stored)) if (curve := curves.find(f"{path}.bars[{i}].weight"))}
@@ -311,10 +351,15 @@ def _bars(sampling: Sampling, path: str, shutter: PropertyGroup, options: keyfra
 
 
 def _bars_over(shutter: PropertyGroup, keyed: dict[int, FCurve], frames: Frames) -> dict[float, np.ndarray | UserError]:
-    """Return a shutter's bars (L,), how much each frame counts, by timeline frame; an error where one is out of range.
+    """Return a shutter's bars at timeline frames: how much each frame of its window counts.
+
+    Bars without an F-curve have their stored value at all frames. F-curves are clipped to the range of bars.
 
     Args:
-        keyed: F-curves by the index of their bar.
+        keyed: F-curves by the index of the bar that they animate.
+
+    Returns:
+        The bars (L,) by timeline frame; an error in place of bars of which one is out of range or NaN.
     """
     rows = np.tile(np.array([bar.weight for bar in shutter.bars]), (len(frames), 1))
     for i, curve in keyed.items():
@@ -328,13 +373,16 @@ def _bars_over(shutter: PropertyGroup, keyed: dict[int, FCurve], frames: Frames)
 
 
 def _ways(curves: list, keys: list[float], frames: Frames) -> dict[float, tuple[tuple[float, float], float]]:
-    """Return, for each frame, the two keys around it, and the share 0 to 1 of the way between them.
-
-    The curve whose value changes most between the two keys gives the share.
+    """Return which two keys are around each frame, and how far bars have come from the first to the second.
 
     Args:
         curves: F-curves of a shutter's bars.
         keys: Timeline frames of all their keys, ascending.
+        frames: Timeline frames.
+
+    Returns:
+        For each frame: ((frame of the key before, frame of the key after), share 0 to 1). The curve whose value changes
+        most between the two gives the share. On a key and outside all keys, both are the nearest key; the share is 0.
     """
     ways, leaders = {}, {}
     for frame in frames:
@@ -348,11 +396,12 @@ def _ways(curves: list, keys: list[float], frames: Frames) -> dict[float, tuple[
 
 
 def _any_region(sampling: Sampling, index: int, shutter: int) -> model.Region | model.MatteRegion:
-    """Return a region of any kind as the model has it.
+    """Return a region of any kind (scribbles, outline, subject, matte or ramp) as the model has it.
 
     Args:
-        index: Of the region.
-        shutter: Index of its shutter.
+        sampling: Reads the effect.
+        index: Index of the region in the effect.
+        shutter: Index of the region's shutter in the effect.
 
     Raises:
         EffectError, MediaError: A matte has no content.
@@ -373,13 +422,15 @@ def _any_region(sampling: Sampling, index: int, shutter: int) -> model.Region | 
 
 
 def _drawn(sampling: Sampling, index: int) -> tuple[dict[str, Any], Any]:
-    """Return what is drawn in an outline or a subject, and the CarriedFile that makes its mattes by tracking.
+    """Return the drawings of an outline or a subject, and what makes its mattes by tracking them through the footage.
 
     Args:
-        index: Of the region.
+        sampling: Reads the effect.
+        index: Index of the region in the effect.
 
     Returns:
-        Drawings by the names of the model's fields. None in place of the file for an outline that is not tracked.
+        The drawings, by the names of the fields in the model's region class: "drawings" and, for a subject, also "nots"
+        and "outlines". And a CarriedFile, or None for an outline that is not tracked (*Linear*).
 
     Raises:
         EffectError, MediaError: There is no source.
@@ -399,7 +450,9 @@ def _drawn(sampling: Sampling, index: int) -> tuple[dict[str, Any], Any]:
 
 
 def _by_source_frame(sampling: Sampling, drawings: model.Drawings) -> dict[int, outlines.Curves]:
-    """Return the curves of drawings, in fractions of the picture, by the frame of the footage that they were drawn on.
+    """Return drawn curves by the frame of the footage, from 0, that was shown where they were drawn.
+
+    The curves are in fractions of the picture. If two drawings lie on the same frame of the footage, the later counts.
 
     Raises:
         EffectError, MediaError: There is no source.
@@ -431,12 +484,16 @@ def _camera(sampling: Sampling) -> model.Camera:
 
 
 def recipe_of(scene: Scene, effect: PropertyGroup, strip: Strip, contents: Sequence = ()) -> model.Effect:
-    """Return an effect as a recipe, whose frame 1 is the strip's first.
+    """Return an effect in the form that recipe files have, whose frame 1 is the strip's first frame.
 
-    Regions without a shutter are left out, and what key_fitting.with_keys leaves out.
+    Regions whose shutter does not exist are left out, and so are scribbles, outlines and subjects of which nothing
+    is drawn (see key_fitting.with_keys).
 
     Args:
-        contents: The recipe's contents of matte regions, in order, as in key_fitting.with_keys.
+        scene: The scene that has the strip.
+        effect: The effect that the strip shows.
+        strip: The effect strip.
+        contents: What mattes are in the recipe: one for each matte and ramp that is kept, in the order of the regions.
 
     Raises:
         EffectError: The effect cannot be rendered as it is.

@@ -33,9 +33,9 @@ def has_values(item: bpy_struct, values: Mapping[str, object]) -> bool:
 
 
 def covers_all(scene: Scene, strip: Strip) -> bool:
-    """Tell whether an effect strip's picture is shown unchanged and fills the whole image, at all its frames.
+    """Tell whether an effect strip's picture is shown unchanged and fills the whole image, at all frames of the strip.
 
-    Where it is opaque, it then covers everything below.
+    Where that picture is opaque, it hides all strips below. A strip with any animated property counts as changed.
     """
     size, shown = scene.render, strip.scene.render
     return (
@@ -54,13 +54,16 @@ def covers_all(scene: Scene, strip: Strip) -> bool:
 
 
 def strip_at(scene: Scene, frame: int, but: str | None = None) -> tuple[Strip, bool] | None:
-    """Return the effect strip that is alone visible in a scene at a timeline frame; None: there is none.
+    """Return the effect strip that alone makes a scene's image at a timeline frame: on top, unchanged and filling it.
 
     Args:
-        but: Name of a strip that does not count.
+        scene: The scene.
+        frame: The timeline frame.
+        but: Name of a strip that is ignored, as if it were not there; None: no strip is ignored.
 
     Returns:
-        The strip, and whether Blender blends it with one below, which changes bits of the colors.
+        The strip, and whether Blender blends it with a strip below, which changes the last bits of colors. None if the
+        image is not that of one effect strip, or if that is not certain, as where muting is animated.
     """
     editor = scene.sequence_editor
     if has_animation(scene, ".mute"):
@@ -101,9 +104,9 @@ def has_known_levels(scene: Scene) -> bool:
 
 
 def has_animation(scene: Scene, part: str) -> bool:
-    """Tell whether any property of a scene whose data path contains `part` may be animated.
+    """Tell whether any property of a scene whose data path contains `part` may be animated, by an F-curve or a driver.
 
-    With NLA tracks, all may be.
+    If the scene has NLA tracks, the answer is always True: they may animate anything.
     """
     animation = scene.animation_data
     if animation is None:

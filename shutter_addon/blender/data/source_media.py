@@ -37,12 +37,12 @@ _known: RecentValues[Hashable, Any] = RecentValues()  # what `stamps` and `spec`
 
 
 def media_key(strip: Strip) -> tuple:
-    """Return a key of what a strip reads and how; equal keys give the same frames.
+    """Return a key for a strip's files and how they are read. Equal keys mean the same frames.
 
-    Of many files, the first and the last are checked now, the others only after look_again.
+    The key changes when the first or last file is replaced; when another one is, only after look_again.
 
     Raises:
-        MediaError: It has no files.
+        MediaError: The strip has no files, or is a clip strip that is undistorted or stabilized.
     """
     count, path = _files(strip)
     ends = [(str(end), stamp(end)) for end in dict.fromkeys((path(0), path(count - 1)))]
@@ -56,11 +56,13 @@ def look_again() -> None:
 
 
 def stamps(place: Hashable, files: Callable[[], Iterable[Path]]) -> int:
-    """Return a number for the state of files on disk. It changes only after look_again, if one was replaced.
+    """Return a number for the state (times of change and sizes) of files on disk, to notice when one is replaced.
+
+    The number is cached. Files are looked at only if it is not, so changes are noticed only after look_again.
 
     Args:
-        place: A key for the group of files, under which the number is kept.
-        files: Returns their paths.
+        place: Key under which the number is cached.
+        files: Returns the files' paths.
     """
     return _known.ask(place, lambda: hash(tuple(map(stamp, files()))), _KEPT)
 
@@ -80,12 +82,12 @@ def reading(strip: Strip) -> tuple:
 
 @dataclass(frozen=True)
 class Proxy:
-    """A strip's proxy: smaller files that previews of one size read in place of the footage.
+    """A strip's proxy: smaller copies of its files that previews of one size read in place of the footage.
 
     Attributes:
-        path: A movie, or a folder with a picture for each of the strip's.
-        of_images: Whether `path` is a folder.
-        stamp: Changes when the files are built again.
+        path: The proxy movie, or a folder with a proxy picture for each picture of the strip.
+        of_images: Whether `path` is a folder of pictures.
+        stamp: State of the files. It changes when the proxy is built again.
     """
 
     path: Path
@@ -100,8 +102,8 @@ class SourceSpec:
     Attributes:
         key: What media_key returns for the strip.
         path: The movie, or the first picture.
-        files: A picture for each frame of a strip of images; None for a movie.
-        options: Further arguments of media.open_source.
+        files: The picture file of each frame, for strips that read pictures; None: a movie.
+        options: Other arguments of media.open_source, by name.
     """
 
     key: tuple
@@ -113,11 +115,12 @@ class SourceSpec:
         """Open the footage, with colors and alpha as Blender's strip shows them.
 
         Args:
-            divisor: Reduces the frames' size, as in media.open_source.
-            proxy: The proxy to read frames from, if it fits the footage; None: the footage.
+            divisor: Factor by which both sides of frames are reduced, as in media.open_source.
+            proxy: Proxy to read frames from. If it cannot be read or does not fit the footage, the footage is read
+                instead, as with None.
 
         Raises:
-            MediaError: It cannot be read.
+            MediaError: The footage cannot be read.
         """
         medium = open_source(self.path, files=self.files, divisor=divisor, **self.options)
         if proxy is None:
@@ -134,7 +137,7 @@ def spec(strip: Strip) -> SourceSpec:
     """Return a strip's footage and how it is read.
 
     Raises:
-        MediaError: The strip has no files.
+        MediaError: The strip has no files, or is a clip strip that is undistorted or stabilized.
     """
     key = media_key(strip)
     return _known.ask(key, lambda: _spec(strip, key), _KEPT)
@@ -159,7 +162,7 @@ def files(strip: Strip) -> list[Path]:
     """Return the files of a movie, image or clip strip, including missing ones and ones that effects cannot use.
 
     Raises:
-        MediaError: It names none.
+        MediaError: An image strip has no pictures, or a clip strip has no clip.
     """
     count, path = _clip_files(strip) if strip.type == "MOVIECLIP" else _files(strip)
     return list(map(path, range(count)))
@@ -177,10 +180,10 @@ def is_movie(strip: Strip) -> bool:
 
 
 def _files(strip: Strip) -> tuple[int, Callable[[int], Path]]:
-    """Return the number of a strip's files, and a function from an index to a path.
+    """Return the number of a strip's files, and a function from an index (from 0) to a file's path.
 
     Raises:
-        MediaError: It names none, or it is a clip strip that is undistorted or stabilized.
+        MediaError: An image strip has no pictures, or a clip strip has no clip, or is undistorted or stabilized.
     """
     if strip.type == "MOVIECLIP":
         if strip.clip is not None and (strip.undistort or strip.stabilize2d):
@@ -197,7 +200,9 @@ def _files(strip: Strip) -> tuple[int, Callable[[int], Path]]:
 
 
 def _clip_files(strip: Strip) -> tuple[int, Callable[[int], Path]]:
-    """Return a clip's files as _files does: its movie, or its pictures by number, whether they exist or not.
+    """Return the number of a clip strip's files, and a function from an index (from 0) to a file's path.
+
+    The files are the clip's movie, or its numbered pictures from its *Frame Offset* on, whether they exist or not.
 
     Raises:
         MediaError: The strip has no clip.
@@ -232,8 +237,8 @@ def timing_of(strip: Strip) -> StripTiming:
 def retiming_keys(strip: Strip) -> tuple[RetimingKey, ...] | None:
     """Return a strip's retiming keys, read from Blender's memory; None: they cannot be read.
 
-    Python's API has only their frames, none for clip strips, and Blender 5.2 counts them from the start of the edit's
-    first strip.
+    Blender's Python API would not do. It gives only the keys' frames, and none for clip strips. In Blender 5.2, it
+    counts these frames from the start of the edit's first strip.
     """
     try:
         name, first, count = read(record("Sequence", *_SEQUENCE), strip.as_pointer())
@@ -254,9 +259,14 @@ def are_retiming_keys(keys: Sequence[RetimingKey]) -> bool:
 
 
 def proxy_of(scene: Scene, strip: Strip, percent: int) -> Proxy | None:
-    """Return the proxy that previews read of a strip; None: they read the footage itself.
+    """Return the proxy that previews of one size read for a strip; None: they read the footage itself.
+
+    They do so if the strip has no proxy of this size, if the proxy has a custom file or folder or is missing on disk,
+    for clip strips, and for image strips if the sequencer's color space is not sRGB.
 
     Args:
+        scene: The scene that has the strip.
+        strip: The source strip.
         percent: Size of the preview: 25, 50, 75 or 100.
     """
     if strip.type not in ("MOVIE", "IMAGE") or not strip.use_proxy or not getattr(strip.proxy, f"build_{percent}"):
@@ -280,9 +290,10 @@ def of_image(folder: Path, image: str | Path) -> Path:
 
 
 def _folder(scene: Scene, beside: Path) -> Path:
-    """Return the folder in which Blender keeps proxies.
+    """Return the folder in which Blender keeps proxies: the scene's, or a folder beside the footage.
 
     Args:
+        scene: The scene, whose proxies may all be stored in one folder.
         beside: Folder of the footage.
     """
     if scene.sequence_editor.proxy_storage == "PROJECT":  # Blender finds it from the open file
@@ -291,11 +302,11 @@ def _folder(scene: Scene, beside: Path) -> Path:
 
 
 def _proxy(path: Path, *files: Path) -> Proxy | None:
-    """Return a proxy; None: a file of it is missing.
+    """Return a proxy; None: one of its files is missing.
 
     Args:
-        path: A movie, or a folder of pictures.
-        files: Of a folder, the pictures that have to exist.
+        path: The proxy movie, or the folder of proxy pictures.
+        files: For a folder, the pictures in it that are checked. For a movie, none.
     """
     stamps = tuple(map(stamp, files or (path,)))
     return None if None in stamps else Proxy(path, bool(files), stamps)

@@ -70,11 +70,12 @@ def effect_of(scene: Scene, effect_scene: Scene) -> Any:
 
 
 def find_effect(effect_scene: Scene, scene_frame: float = 0) -> tuple[Scene, PropertyGroup, Strip]:
-    """Return the scene, the effect and the effect strip that an effect scene belongs to.
+    """Return the scene that has an effect, the effect, and a strip that shows it, given the effect scene.
 
     Args:
-        scene_frame: Frame of the effect scene. Of several parts of a cut strip, the one that shows it is returned, or
-            else the first.
+        effect_scene: The effect scene.
+        scene_frame: Frame of the effect scene. If an effect strip was cut into parts, the part that shows this frame is
+            returned; if none does, the first part.
 
     Raises:
         EffectError: No strip shows the effect scene.
@@ -119,11 +120,17 @@ def timeline_frame(strip: Strip, scene_frame: float) -> float:
 def source_of(scene: Scene, effect: PropertyGroup, strip: Strip) -> Strip:
     """Return the source strip of an effect strip.
 
-    Parts of a cut source and copies of it have the same identity. Of several, the nearest in time counts, then one in
-    the same meta strip, a connected one, and the nearest channel, below first.
+    Copies of a source and the parts of a cut source share an identity. Of several such strips, the nearest in time is
+    taken. Among equally near ones, one in the same meta strip comes first, then one that Blender has connected to the
+    effect strip, then one in a channel below, then the nearest channel.
+
+    Args:
+        scene: The scene that has the strip.
+        effect: The effect that the strip shows.
+        strip: The effect strip.
 
     Raises:
-        EffectError: It was deleted, or is not a movie, image or clip strip.
+        EffectError: The source was deleted, or is not a movie, image or clip strip.
     """
     if (source := nearest_source(scene, effect, strip)) is None:
         if others := identified(scene, "virtual_shutter_source", effect.source):
@@ -134,7 +141,13 @@ def source_of(scene: Scene, effect: PropertyGroup, strip: Strip) -> Strip:
 
 
 class Shown(NamedTuple):
-    """An effect with a strip that shows it, and the strip's source; None: the source is missing."""
+    """An effect strip, with the effect that it shows and its source.
+
+    Attributes:
+        effect: The effect.
+        strip: The effect strip.
+        source: The source strip; None: it is missing.
+    """
 
     effect: PropertyGroup
     strip: Strip
@@ -172,10 +185,11 @@ def identified(scene: Scene, name: str, identity: str) -> list:
 
 
 def invalidate(scene: Scene, effect_scene: Scene | None = None) -> None:
-    """Drop the frames that Blender's sequencer keeps of a scene's effect strips, so that they are made again.
+    """Drop the pictures of a scene's effect strips that Blender's sequencer caches, so that they are made again.
 
     Args:
-        effect_scene: Only for strips that show this one; None: for all.
+        scene: The scene that has the strips.
+        effect_scene: Drop only those of strips that show this effect scene; None: those of all effect strips.
     """
     revision.changed()
     for strip in effect_strips(scene):

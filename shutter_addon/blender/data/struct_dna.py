@@ -20,17 +20,17 @@ _POINTER = 8  # bytes
 
 
 class LayoutError(Exception):
-    """This Blender lays a record out differently, or its layout cannot be read."""
+    """This Blender's layout of a record (C struct) differs from the expected one, or cannot be read."""
 
 
 @cache
 def record(name: str, *fields: tuple[str, str]) -> np.dtype:
-    """Return the NumPy type of a record (C struct) in Blender's memory, limited to some of its fields.
+    """Return the NumPy type of a record (C struct) in Blender's memory, limited to some of its fields, for `read`.
 
     Args:
         name: The struct's name in Blender's source.
-        fields: Each as Blender declares it, and as NumPy reads it: ("char name[64]", "S64"). A linked list has two
-            addresses, of its first and its last item.
+        fields: For each field its declaration in Blender and its NumPy format, such as ("char name[64]", "S64"). A
+            linked list consists of two addresses, of its first and its last item.
 
     Raises:
         LayoutError: This Blender has no such record or field.
@@ -44,10 +44,14 @@ def record(name: str, *fields: tuple[str, str]) -> np.dtype:
 
 
 def read(kind: np.dtype, address: int) -> tuple:
-    """Return the fields of a record at an address in Blender's memory: numbers, bytes and lists.
+    """Return the fields of a record at an address in Blender's memory, in the order in which `record` was given them.
 
     Args:
         kind: The record's type, from `record`.
+        address: The record's address.
+
+    Returns:
+        A number, bytes, or for an array a list, for each field.
     """
     fields = np.frombuffer(ctypes.string_at(address, kind.itemsize), kind)[0]
     return tuple(fields[name].tolist() for name in kind.names or ())
@@ -55,11 +59,11 @@ def read(kind: np.dtype, address: int) -> tuple:
 
 @cache
 def described() -> dict[str, tuple[int, dict[str, int]]]:
-    """Return the layout of all records in Blender's memory, by their name.
+    """Return the layout of all records (C structs) in Blender's memory, by name.
 
     Returns:
-        The record's size in bytes, and the offset in bytes of each field, by its declaration. Empty if the layout
-        cannot be read. Either answer is kept, because masks are read at every frame.
+        For each record, its size in bytes, and the offset in bytes of each field by its declaration, such as "char
+        name[64]". Empty if the layout cannot be read. Either answer is cached, because masks are read at every frame.
     """
     try:
         with tempfile.TemporaryDirectory(prefix="virtual_shutter_dna_", ignore_cleanup_errors=True) as folder:
@@ -97,10 +101,14 @@ def parsed(blend: bytes) -> dict[str, tuple[int, dict[str, int]]]:
 
 
 def _words(data: memoryview, at: int) -> tuple[list[str], int]:
-    """Return a list of words from the description, and the offset of the part behind it.
+    """Read one list of words (names or types) from the description of records.
 
     Args:
-        at: Offset of the list's mark of four bytes, which its number of words follows.
+        data: The description.
+        at: Offset of the list: a mark of four bytes such as "NAME", then the number of words, then the words.
+
+    Returns:
+        The words, and the offset of what follows the list.
     """
     (count,) = struct.unpack_from("<i", data, at + 4)
     words = bytes(data[at + 8 :]).split(b"\0", count)[:count]
@@ -109,11 +117,11 @@ def _words(data: memoryview, at: int) -> tuple[list[str], int]:
 
 
 def _length(name: str, size: int) -> int:
-    """Return the bytes that a field takes: its type's size, or a pointer's, times its dimensions.
+    """Return how many bytes a field takes: the size of its type, or of a pointer, times its array dimensions.
 
     Args:
-        name: As declared, such as "*next" or "co[3]".
-        size: Bytes of the field's type.
+        name: Name as declared, such as "*next" (a pointer) or "co[3]" (an array).
+        size: Size of the field's type in bytes.
     """
     one = _POINTER if name.startswith(("*", "(*")) else size
     return one * math.prod(map(int, re.findall(r"\[(\d+)\]", name)))

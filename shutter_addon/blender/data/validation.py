@@ -38,13 +38,15 @@ def place(group: PropertyGroup) -> str:
 
 
 def number(group: PropertyGroup, name: str, value: float | None = None) -> Any:
-    """Return a property's number after checking it.
+    """Return the number of a property after checking that it lies in the property's range.
 
     Args:
-        value: Checked and returned in place of the property's own value.
+        group: The property group that has the property.
+        name: The property's name.
+        value: Number to check and return in place of the one that is stored; None: the stored one.
 
     Raises:
-        EffectError: It is out of the property's range.
+        EffectError: The number is out of the property's range, or NaN.
     """
     value, prop = getattr(group, name) if value is None else value, group.bl_rna.properties[name]
     if prop.hard_min <= value <= prop.hard_max:  # false for NaN
@@ -58,24 +60,25 @@ def number(group: PropertyGroup, name: str, value: float | None = None) -> Any:
 
 
 def check(items: Sequence[PropertyGroup], name: str, numbers: np.ndarray) -> None:
-    """Check a number for each item of a collection.
+    """Check that numbers for one property of the items of a collection lie in the property's range.
 
     Args:
-        name: The items' property that the numbers are for.
-        numbers: (n,), one for each item.
+        items: The items.
+        name: The property's name.
+        numbers: (n,): a number for each item.
 
     Raises:
-        EffectError: One is out of the property's range.
+        EffectError: A number is out of the property's range, or NaN.
     """
     for item, value in zip(items, numbers.tolist(), strict=True):
         number(item, name, value)
 
 
 def check_moving(moving: PropertyGroup) -> None:
-    """Check the numbers and the kind of a region or the camera.
+    """Check that all stored float properties of a region or the camera are in range, and that a region's kind is valid.
 
     Raises:
-        EffectError: One is out of range.
+        EffectError: A number is out of range, or the kind is none of its choices.
     """
     for prop in moving.bl_rna.properties:
         if prop.identifier == "kind":
@@ -85,10 +88,12 @@ def check_moving(moving: PropertyGroup) -> None:
 
 
 def word(group: PropertyGroup, name: str, value: float | None = None) -> Any:
-    """Return the identifier of an enum property's item.
+    """Return the identifier of the item that an enum property has, after checking that there is such an item.
 
     Args:
-        value: Number of an item, from an F-curve; None: the item that is set.
+        group: The property group that has the property.
+        name: The property's name.
+        value: Number of an item, as an F-curve gives it, used in place of the stored item; None: the stored item.
 
     Raises:
         EffectError: There is no such item.

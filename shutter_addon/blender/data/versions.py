@@ -28,10 +28,11 @@ def extension() -> str:
 
 
 def colours() -> str:
-    """Return an identifier of the OpenColorIO configuration that Blender uses; "": the one that comes with Blender.
+    """Return an identifier of the OpenColorIO configuration that Blender uses; "": it is Blender's own.
 
     Returns:
-        The name of a configuration built into OpenColorIO, or the SHA-256 of a file, without the tables that it names.
+        The name of a configuration built into OpenColorIO ("ocio://…"), or the hash of a configuration file. The lookup
+        tables that such a file refers to are not part of the hash.
     """
     # Blender sets OCIO to its own file when it starts, and its child processes inherit that.
     path = os.environ.get("BLENDER_OCIO", os.environ.get("OCIO", ""))
@@ -43,10 +44,13 @@ def colours() -> str:
 
 
 def of_edit(scene: Scene) -> EditVersion:
-    """Return the version of the open edit: of the extension and of Blender, and digests of the .blend file and footage.
+    """Return what identifies the version of the open edit, for comparing edits on several machines.
+
+    It has the versions of the extension and of Blender, the color configuration (`colours`), and hashes of the .blend
+    file and of all other files that its pictures are made from. A missing file counts by its name.
 
     Raises:
-        OSError: The .blend file is gone.
+        OSError: The .blend file was never saved, or is gone.
     """
     with open(bpy.data.filepath, "rb") as file:
         blend = hashlib.file_digest(file, "sha256").hexdigest()
@@ -79,10 +83,10 @@ def _footage_files(scene: Scene) -> Iterator[list[Path]]:
 
 
 def digests(files: list[Path]) -> list[bytes | None]:
-    """Return a digest of each file's contents; None for a file that is missing or unreadable.
+    """Return a hash of each file's contents; None for a file that is missing or unreadable.
 
-    They are read in parallel. Of a file above derived.WHOLE bytes, only the size and some blocks count. If there are
-    more than _FEW files, this begins above _BLOCKS bytes.
+    The files are read in parallel. Of a large file, only the size and some blocks count. A file is large above
+    derived.WHOLE bytes or, if there are more than _FEW files, above _BLOCKS bytes.
     """
     whole = derived.WHOLE if len(files) <= _FEW else _BLOCKS
     with threads.pool(_READERS) as pool:
@@ -90,10 +94,11 @@ def digests(files: list[Path]) -> list[bytes | None]:
 
 
 def _digest(path: Path, whole: int) -> bytes | None:
-    """Return the digest of a file's contents; None: it is missing or unreadable.
+    """Return the hash of a file's contents; None: the file is missing or unreadable.
 
     Args:
-        whole: Bytes up to which a file is read as a whole, as in derived.content_digest.
+        path: The file.
+        whole: Size in bytes up to which all of a file is hashed. Of a larger one only the size and some blocks are.
     """
     try:
         return derived.content_digest(path, whole)

@@ -29,17 +29,17 @@ OPEN: dict[str, Callable[..., Compositor]] = {
 
 
 def choose(wanted: str, *, window_waits: bool = False) -> tuple[str, str | None]:
-    """Choose the device that composes renders.
+    """Choose the device that composes renders, which need not be the one for previews.
 
     Args:
-        wanted: One of CHOICES.
-        window_waits: Whether Blender's window waits for the picture, so that its GPU cannot be used.
+        wanted: One of CHOICES. "auto" takes OpenGL, else Blender's GPU, else NumPy; "gpu" takes one of the first two.
+        window_waits: Whether Blender's window is blocked until the picture is made. Then Blender's GPU cannot be used.
 
     Returns:
-        A key of OPEN. If "auto" found only a slower device, also a sentence for the user that says why, else None.
+        The device as a key of OPEN. And a sentence for the user that says why "auto" did not find OpenGL; else None.
 
     Raises:
-        NoDeviceError: The wanted device is missing.
+        NoDeviceError: The wanted device cannot be used.
     """
     if wanted == "cpu":
         return "cpu", None
@@ -64,10 +64,10 @@ def choose(wanted: str, *, window_waits: bool = False) -> tuple[str, str | None]
 
 
 def name(kind: str) -> str:
-    """Return the name of a device for the user, such as its GPU's.
+    """Return the name of a device for the user: of its GPU, or "NumPy".
 
     Args:
-        kind: A key of OPEN.
+        kind: The device, a key of OPEN.
     """
     if kind == "cpu":
         return "NumPy"
@@ -75,12 +75,12 @@ def name(kind: str) -> str:
 
 
 class OpenGL(NamedTuple):
-    """What a trial of OpenGL 4.3 found.
+    """Whether a separate OpenGL 4.3 context can be used on this machine, as found by trying.
 
     Attributes:
-        name: Of its renderer.
-        memory: The most bytes that textures may take.
-        lacking: Why OpenGL 4.3 cannot be used; None: it can.
+        name: Name of the GPU; "": it cannot be used.
+        memory: The most bytes that textures may take; None: OpenGL cannot be used.
+        lacking: A sentence that says why OpenGL 4.3 cannot be used; None: it can.
     """
 
     name: str = ""
@@ -90,9 +90,9 @@ class OpenGL(NamedTuple):
 
 @cache
 def opengl() -> OpenGL:
-    """Find out once whether OpenGL 4.3 can be used, and keep the answer.
+    """Find out whether a separate OpenGL 4.3 context can be used. The answer is cached.
 
-    It is tried on a separate thread, because where Blender's context is current, another may fail.
+    A context is opened on a separate thread, because on one where Blender's own is current, that may fail.
     """
     return threads.start(_tried).result()
 

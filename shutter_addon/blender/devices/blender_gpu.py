@@ -46,8 +46,8 @@ LETTING_GO = read_pass("blender_gpu", "LET_GO")
 def has_context() -> bool:
     """Tell whether Blender's GPU can be used on this thread now, as it can where Blender draws.
 
-    After a window was closed it cannot, until another window is drawn. Running a pass or freeing a shader would crash
-    Blender then.
+    After a window was closed, it cannot be used until another window is drawn. Running a pass or freeing a shader
+    meanwhile would crash Blender.
     """
     try:
         GPUTexture((1, 1))
@@ -79,9 +79,12 @@ def free_unused() -> None:
 
 
 class BlenderDevice(Device):
-    """Blender's GPU as a Device, for code that runs where it can be used: in draw handlers, or after gpu.init().
+    """Blender's GPU as a Device, for code that runs where the GPU can be used: in draw handlers, or after gpu.init().
 
     Private methods take and return the gpu module's textures. RelayedDevice calls them on the main thread.
+
+    Attributes:
+        unused: Textures and shaders of all devices, to be freed when Blender's GPU can next be used.
     """
 
     unused: list = []  # objects of the gpu module, to be freed once Blender's GPU is current
@@ -110,11 +113,11 @@ class BlenderDevice(Device):
         return nullcontext(self)
 
     def _cleared(self) -> AbstractContextManager[BlenderDevice]:
-        """Unbind this device's textures on OpenGL, and return the context that `current` returns.
+        """Unbind textures on OpenGL, and return the context for a `with` block in which passes run.
 
-        Blender has one OpenGL context for an engine's render and one for drawing. A texture that is freed in one stays
-        bound in the other. Blender and Mesa take a new texture with the same number for that one, so passes would use
-        it.
+        Blender has one OpenGL context for an engine's render and another for drawing. A texture that is freed in one of
+        them stays bound in the other. A new texture may get the same number there. Blender and Mesa then take it to be
+        bound already, so passes would use the freed one.
         """
         if gpu.platform.backend_type_get() == "OPENGL":
             if self._spare is None:
@@ -142,9 +145,14 @@ class BlenderDevice(Device):
             self._send(texture.gpu, unpacking, sent, top, layer)
 
     def send(self, texture: Texture, frame: np.ndarray) -> Texture:
-        """Send an opaque 8-bit frame for the next pass, as Device.send does: as the numbers of an r32f texture.
+        """Send an opaque 8-bit frame to the GPU for the next pass, as Device.send does.
 
-        Frames that are too large to be sent at once are written to `texture` instead.
+        Args:
+            texture: An rgba8 texture of the frame's size, used only if the frame is too large to be sent at once.
+            frame: (rows, width, 4) uint8.
+
+        Returns:
+            The texture for that pass: a new one of r32f with the numbers R + 256 G + 65536 B, or else `texture`.
         """
         height, width = frame.shape[:2]
         if width * height * texel_bytes("r32f") > _SENT_BYTES:
@@ -153,14 +161,14 @@ class BlenderDevice(Device):
         return Texture(None, (width, height, 1), "r32f", _new((width, height), "R32F", data))
 
     def _send(self, stored: GPUTexture, program: Pass, sent: tuple, top: int, layer: int) -> None:
-        """Send one band of a frame to the GPU, and run the pass that unpacks it.
+        """Send one band of rows of a frame to the GPU, and run the pass that unpacks it into a texture.
 
         Args:
             stored: The texture to fill.
             program: The pass that unpacks.
-            sent: Arguments of _new for the texture that is sent.
-            top: First row of the band in the layer.
-            layer: Layer of `stored`.
+            sent: The band: size (width, rows), format and buffer, the first arguments of _new.
+            top: Row in the layer at which the band begins.
+            layer: Which layer of `stored` is filled.
         """
         textures, size = {"sent": _new(*sent)}, sent[0]
         constants = {"size": size, "top": top, "layer": layer}
@@ -218,13 +226,15 @@ def texel(texture: Texture, x: int, y: int) -> np.ndarray:
 
 
 def _read_layer(texture: GPUTexture, layer: int, box: tuple, components: int, kind: str, pixels: np.ndarray) -> None:
-    """Read a box of one layer into `pixels`. GPUTexture.read() could read only the first layer.
+    """Read a rectangle of one layer of a texture into an array. GPUTexture.read() could read only the first layer.
 
     Args:
-        box: Left, bottom, width and height in texels.
-        components: Numbers for each texel.
+        texture: The texture.
+        layer: Index of the layer.
+        box: Left, bottom, width and height of the rectangle, in texels.
+        components: Numbers that each texel has: 1 or 4.
         kind: "FLOAT" or "UINT", the type of the numbers.
-        pixels: Contiguous array that receives them.
+        pixels: Contiguous array that is filled with them.
     """
     framebuffer = gpu.types.GPUFrameBuffer(color_slots={"texture": texture, "layer": layer})
     with framebuffer.bind():
@@ -233,9 +243,10 @@ def _read_layer(texture: GPUTexture, layer: int, box: tuple, components: int, ki
 
 @cache
 def opens_in_background() -> bool:
-    """Tell whether Blender's GPU can be used without a window; if so, make it usable on the main thread.
+    """Tell whether Blender's GPU can be used without a window. If so, make it usable on the main thread.
 
-    Another Blender process tries first, because without a GPU, gpu.init() of Blender 5.2 crashes. The answer is kept.
+    A second Blender process tries it first, because without a GPU, gpu.init() of Blender 5.2 crashes. The answer is
+    cached.
     """
     try:
         subprocess.run(_trial(), check=True, capture_output=True, timeout=60)
@@ -255,12 +266,13 @@ def _trial() -> list[str]:
 
 
 def _new(size: tuple[int, int], kind: str, data: gpu.types.Buffer | None = None, layers: int = 1) -> GPUTexture:
-    """Make a texture.
+    """Make a texture, an array of layers.
 
     Args:
         size: Width and height in texels.
         kind: The format, such as "RGBA32F".
         data: Numbers to fill it with; None: its content is undefined.
+        layers: Number of layers.
 
     Raises:
         NoDeviceError: The GPU has no room for it.
@@ -272,10 +284,11 @@ def _new(size: tuple[int, int], kind: str, data: gpu.types.Buffer | None = None,
 
 
 def _buffer(kind: str, array: np.ndarray) -> gpu.types.Buffer:
-    """Return a buffer of the `gpu` module over the memory of a contiguous array, without a copy.
+    """Return a buffer of the `gpu` module that shares the memory of a contiguous array.
 
     Args:
-        kind: "FLOAT" or "UINT".
+        kind: Type of the array's numbers, "FLOAT" or "UINT".
+        array: The array.
     """
     return gpu.types.Buffer(kind, array.size, array.reshape(-1))
 

@@ -35,16 +35,17 @@ _TICK = 0.02  # seconds between two looks at the queue
 
 @dataclass
 class _MainThread:
-    """What other threads want the main thread to do. Times are in seconds of time.monotonic.
+    """What Blender's main thread has to do for other threads. Times are in seconds of time.monotonic.
 
     Attributes:
-        functions: From `soon`, for the timer.
-        calls: Of relayed devices, as (future, function). They also run while Blender draws, when no data may change.
+        functions: Functions given to `soon`. Only the timer calls them.
+        calls: Pairs (future, function) of relayed devices and `ask`. The main thread also calls them while it waits for
+            another thread, even while Blender draws, when no Blender data may change.
         timers: Timers to remove when the extension is disabled.
-        until: Time at which it stops waiting for more calls.
-        looked: Time at which it last made calls.
-        unfinished: Passes that the GPU may still be running.
-        batch: Number of unfinished passes after which the main thread waits for the GPU.
+        until: Time until which more calls are expected, so that the main thread looks for them without a pause.
+        looked: Time at which the main thread last finished making calls.
+        unfinished: Number of calls made since the main thread last waited for the GPU.
+        batch: Value of `unfinished` at which the main thread waits for the GPU.
     """
 
     functions: queue.SimpleQueue[Callable[[], object]]
@@ -60,15 +61,17 @@ _main = _MainThread(queue.SimpleQueue(), queue.SimpleQueue(), set())  # Blender 
 
 
 def soon(function: Callable[[], object]) -> None:
-    """Have the main thread call a function when it next can, after those of earlier calls. Usable on any thread.
+    """Have the main thread call a function when it next can, after functions given before. Any thread may ask.
 
-    Only in a Blender with a window.
+    Only in a Blender with a window, because in the background no timer runs.
     """
     _main.functions.put(function)
 
 
 def call_waiting() -> float:
-    """Call all functions that `soon` was given, and make calls of relayed devices. This is a timer of Blender.
+    """Call the functions that were given to `soon`, then make calls that other threads wait for (`look`).
+
+    This is the timer that Blender calls. An error of a function is printed.
 
     Returns:
         Seconds until Blender calls it again.
@@ -85,9 +88,9 @@ def later(timer: Callable[[], float | None], seconds: float = 0.0, *, persistent
     """Register a timer of Blender, unless it is registered already. To be called on the main thread.
 
     Args:
-        timer: Returns the seconds until its next call, or None to end.
-        seconds: Until the first call.
-        persistent: Whether it goes on when another file is loaded.
+        timer: Function that Blender calls. It returns the seconds until its next call, or None for no more calls.
+        seconds: Seconds until the first call.
+        persistent: Whether the timer goes on when another file is loaded.
     """
     _main.timers.add(timer)
     if not bpy.app.timers.is_registered(timer):
@@ -101,10 +104,11 @@ def drop(*timers: Callable[[], float | None]) -> None:
 
 
 class RelayedDevice(BlenderDevice):
-    """Blender's GPU as a Device for a thread other than the main one, which makes the calls on its behalf.
+    """Blender's GPU as a Device for a thread other than the main one. The main thread makes the GPU calls for it.
 
-    Errors of a pass are raised later, at the latest when something is made, sent or read. Its textures are lists of one
-    texture, which the main thread empties: on Vulkan, Blender crashes if another thread frees a texture.
+    Passes are queued, so their errors are raised later: at the latest when a texture is made, filled or read. Instead
+    of a GPU texture, private methods handle a list that contains one. The main thread empties the list to free the
+    texture: on Vulkan, Blender crashes if another thread frees it.
     """
 
     def __init__(self, *memory: Any) -> None:
@@ -142,9 +146,9 @@ class RelayedDevice(BlenderDevice):
         self._wait_for(lambda: BlenderDevice.release(self))
 
     def _wait_for(self, function: Callable[[], T]) -> T:
-        """Have the main thread call a function after all passes so far, wait, and return its result.
+        """Have the main thread call a function after all passes queued so far, wait for it, and return its result.
 
-        It raises what the function or one of the passes has raised.
+        An error of the function, or else of one of these passes, is raised here.
         """
         result = _called(function).result()
         passes, self._passes = self._passes, []
@@ -163,10 +167,13 @@ def ask(function: Callable[[], None], seconds: float) -> None:
 
 
 def serve(seconds: float = _LEAST) -> bool:
-    """Make the calls of other threads for some seconds, on the main thread, while that waits for one of these threads.
+    """Make calls of other threads on the main thread, such as while it waits for the result of one of these threads.
+
+    Args:
+        seconds: The most time to spend. It ends earlier if no call comes for _GAP seconds.
 
     Returns:
-        False if calls wait that cannot be made, because Blender's GPU cannot be used yet.
+        False if calls wait but cannot be made, because Blender's GPU cannot be used yet.
     """
     if not has_context():
         for window in bpy.context.window_manager.windows:  # so that Blender's GPU can be used again
@@ -188,10 +195,10 @@ def serve(seconds: float = _LEAST) -> bool:
 
 
 def _finish_some() -> None:
-    """Count a pass, and after each batch wait until the GPU has finished it.
+    """Count a call that was made. After each batch of calls, wait until the GPU has finished all passes.
 
     Otherwise passes would pile up, and Blender's drawing would have to wait for all of them. The batch's size adapts so
-    that it takes about _MOMENT seconds.
+    that the wait takes about _MOMENT seconds.
     """
     _main.unfinished += 1
     if _main.unfinished >= _main.batch:
@@ -210,12 +217,13 @@ def _called(function: Callable[[], T]) -> Future[T]:
 
 
 def look() -> bool:
-    """Make the calls that other threads wait for, on the main thread, for _LEAST to _MOST seconds.
+    """Make the calls that other threads wait for, on the main thread.
 
-    Nothing is done if no call waits and none came lately.
+    It spends as much time on them as has passed since it last did, within _LEAST to _MOST seconds. It does nothing if
+    no call waits and none came for _REST seconds.
 
     Returns:
-        Whether to call this again at once.
+        Whether more calls are expected, so that this should be called again at once.
     """
     if _main.calls.empty() and time.monotonic() >= _main.until:
         return False

@@ -71,7 +71,9 @@ def choose_source(effect: PropertyGroup, strip: Strip, source: Strip) -> None:
     """Make an effect use another movie, image or clip strip as its source.
 
     Args:
-        strip: The effect strip.
+        effect: The effect.
+        strip: The effect strip that shows it, which is then connected to the source.
+        source: The new source.
 
     Raises:
         MediaError: The source's footage cannot be read.
@@ -85,10 +87,13 @@ def choose_source(effect: PropertyGroup, strip: Strip, source: Strip) -> None:
 
 
 def own_source(source: Strip, shown: list[Shown]) -> None:
-    """Give a source strip a new, unique identity (a text), and store that in all effects that use the strip.
+    """Give a source strip a new, unique identity (a text), which copies and cut parts of it do not have.
+
+    Effects find their source by its identity, so they would otherwise take the nearest of these strips.
 
     Args:
-        shown: All effects with their strips and sources.
+        source: The source strip.
+        shown: All effects with their strips and sources. The new identity is stored in those that use the strip.
     """
     source.virtual_shutter_source = uuid.uuid4().hex
     for effect in [each.effect for each in shown if each.source == source]:
@@ -96,12 +101,12 @@ def own_source(source: Strip, shown: list[Shown]) -> None:
 
 
 def _take(source: Strip) -> FrameSource:
-    """Make a strip the source of an effect: give it an identity, and mute it if it is transparent.
+    """Make a strip the source of an effect: give it an identity if it has none, and mute it if it is transparent.
 
     A transparent source would show behind the effect. An opaque one stays visible, for when the effect is muted.
 
     Returns:
-        The footage, closed; its size and kind of alpha can still be read.
+        The footage, closed. Its size and kind of alpha can still be read.
 
     Raises:
         MediaError: The source's footage cannot be read.
@@ -146,10 +151,14 @@ def copy_look(source: Strip, strip: Strip, *, keys: bool = False) -> None:
 
 
 def settings(strip: Strip, name: str) -> list[tuple[bpy_struct, str]]:
-    """Return (owner, property name) of the strip's property `name` or, if it is a property group, of all in the group.
+    """Return one strip property or, if the property is a group, all writable properties in the group.
 
     Args:
-        name: A property of strips, as listed in LOOK.
+        strip: The strip.
+        name: Name of the property or group, one of those in LOOK.
+
+    Returns:
+        Pairs of the struct that has a property (the strip or the group), and the property's name.
     """
     group = getattr(strip, name)
     if not isinstance(group, bpy_struct):
@@ -162,7 +171,8 @@ def new_footage(level: StripsTopLevel, name: str, files: list[str], channel: int
 
     Args:
         level: The strips of a scene or of a meta strip, to which the new one is added.
-        files: A movie, or the pictures of an image sequence in order.
+        name: Name of the strip.
+        files: The movie's path; or the paths of the pictures in order, all in one folder.
         channel: The strip's channel.
         start: Timeline frame at which the strip starts.
         is_movie: Whether `files` is a movie.
@@ -179,8 +189,9 @@ def new_effect_scene(scene: Scene, identity: str, name: str, size: tuple[int, in
     """Add an effect scene, which the engine of this extension renders, with a camera and an empty annotation.
 
     Args:
-        scene: The scene that will have the effect; gives the frame rate.
+        scene: The scene of the edit that will have the effect. Its frame rate is taken over.
         identity: Unique text, which effect, strip and effect scene store to find each other.
+        name: Name of the effect scene and of the annotation.
         size: Width and height of the footage in pixels.
     """
     effect_scene = bpy.data.scenes.new(name)

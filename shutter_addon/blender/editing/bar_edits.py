@@ -19,10 +19,12 @@ from ..rendering import effect_source, invalidation, sessions
 def summary(weights: np.ndarray, combine: str = "AVERAGE") -> str:
     """Return a text for the user about a shutter's bars, such as "180° (4 of 8 frames)".
 
+    If all bars are zero, it says that the shutter never opens.
+
     Args:
-        weights: The bars (L,): how much each frame counts.
-        combine: How frames are combined, an item of choices.COMBINES. Unless it is "AVERAGE", the text says how many
-            frames are combined instead of the angle.
+        weights: The bars (L,): how much each frame of the window counts.
+        combine: How frames are combined, the first word of an item of choices.COMBINES. "AVERAGE" gives the shutter's
+            angle; for others, the text has the number of frames that are combined in place of the angle.
     """
     if not np.any(weights):
         return iface_("All bars are zero: the shutter never opens")
@@ -36,12 +38,17 @@ def summary(weights: np.ndarray, combine: str = "AVERAGE") -> str:
 
 
 def told(scene: Scene, effect: PropertyGroup, strip: Strip, weights: np.ndarray) -> str:
-    """Return a text for the user about the active shutter's bars. It is kept until something changes.
+    """Return a text for the user about the active shutter's bars: how long it is open.
 
-    If the exposure's length varies, it says how many frames are open at the current frame; otherwise it is `summary`.
+    If the exposure's length varies (*Timeline*, or *Distance* of what it follows), the text says how many frames are
+    open at the playhead. Otherwise it is the text of `summary`; also if the playhead is not on the strip, during a
+    render, and where the effect has an error.
 
     Args:
-        weights: The bars (L,): how much each frame counts.
+        scene: The scene that has the strip.
+        effect: The effect that the strip shows.
+        strip: The effect strip.
+        weights: The bars (L,): how much each frame of the window counts.
     """
     index, frame = effect.active_shutter, scene.frame_current
     shutter = effect.shutters[index]
@@ -56,10 +63,11 @@ def told(scene: Scene, effect: PropertyGroup, strip: Strip, weights: np.ndarray)
 
 
 def set_bars(shutter: PropertyGroup, weights: Sequence[float] | np.ndarray) -> None:
-    """Set the weights of a shutter's bars, except those that have the value already.
+    """Set the weights of a shutter's bars. Bars that have the wanted weight already are not touched.
 
     Args:
-        weights: (L,): how much each frame counts.
+        shutter: The shutter.
+        weights: (L,): how much each frame of the window counts, one for each bar.
     """
     for bar, weight in zip(shutter.bars, weights, strict=True):
         if bar.weight != np.float32(weight):
@@ -72,12 +80,13 @@ def auto_key(context: Context) -> bool:
 
 
 def paint(effect: PropertyGroup, index: int, weights: Sequence[float] | np.ndarray, key: bool = False) -> None:
-    """Set how many bars a shutter has, and their weights at the current frame.
+    """Give a shutter as many bars as there are weights, and set their stored weights.
 
     Args:
-        index: Index of the shutter.
-        weights: (L,): how much each frame counts.
-        key: Also insert keyframes for the weights.
+        effect: The effect.
+        index: Index of the shutter in the effect.
+        weights: (L,): how much each frame of the window counts.
+        key: Also insert keyframes at the current frame. Without them, animated bars change back with the next frame.
     """
     shutter = effect.shutters[index]
     while len(shutter.bars) > len(weights):
@@ -90,10 +99,13 @@ def paint(effect: PropertyGroup, index: int, weights: Sequence[float] | np.ndarr
 
 
 def key_bars(effect: PropertyGroup, index: int) -> None:
-    """Insert keyframes at the current frame for all bars of a shutter, with the weights that the picture uses.
+    """Insert keyframes at the current frame for all bars of a shutter, with the weights of the picture there.
+
+    Between keys, these differ from the values of the bars' F-curves (see bars_now).
 
     Args:
-        index: Index of the shutter.
+        effect: The effect.
+        index: Index of the shutter in the effect.
     """
     # Between keys, the values of F-curves differ from the bars that the picture uses.
     shutter, scene = effect.shutters[index], effect.id_data
@@ -120,9 +132,17 @@ def unkey_bars(effect: PropertyGroup, index: int) -> bool:
 
 
 def shown(effect: PropertyGroup, index: int) -> tuple[np.ndarray, list[str]]:
-    """Return what the bar editor draws of a shutter at the current frame: bars (L,) and their states (key_state).
+    """Return what the bar editor draws of a shutter at the current frame. It is cached until something changes.
 
-    The result is cached until something changes.
+    Args:
+        effect: The effect.
+        index: Index of the shutter in the effect.
+
+    Returns:
+        The bars (L,), from bars_now; and the animation state of each bar, from key_state.
+
+    Raises:
+        EffectError: As for bars_now.
     """
     key = effect.scene.session_uid, index, effect.id_data.frame_float
     return revision.until_change("bars", key, lambda: _read(effect, index))
