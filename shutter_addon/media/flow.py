@@ -507,7 +507,7 @@ def _encoded(frame: np.ndarray, transfer: str, alpha: str) -> np.ndarray:
         others become float32, with 1 for white.
     """
     if alpha == "opaque" and transfer == "srgb" and frame.dtype.kind == "u":
-        return np.ascontiguousarray(frame[..., :3])
+        return cv2.cvtColor(frame, cv2.COLOR_RGBA2RGB)
     white = np.iinfo(frame.dtype).max if frame.dtype.kind == "u" else 1
     rgba = frame.astype(np.float32) / np.float32(white)
     # Interpolation would turn everything around an infinite sample into NaN.

@@ -11,6 +11,8 @@ from ..core.messages import MediaError
 from .files import check_name
 from .rendered_pictures import UNKNOWN, why_short
 
+QUICK = 3  # PNG's compression level, 0 to 9. It takes three quarters of the usual time; mattes get a fourth larger.
+
 
 def write_exr(path: Path, values: np.ndarray, names: Sequence[str], note: str = "") -> None:
     """Write an EXR file, which appears only when it is complete.
@@ -51,16 +53,16 @@ def write_levels(path: Path, levels: np.ndarray, description: str) -> None:
     Raises:
         MediaError: The file cannot be written.
     """
-    _write(path, levels[..., None], {"ImageDescription": description})
+    _write(path, levels[..., None], {"ImageDescription": description, "png:compressionLevel": QUICK})
 
 
-def _write(path: Path, samples: np.ndarray, attributes: dict[str, str], names: Sequence[str] = ()) -> None:
+def _write(path: Path, samples: np.ndarray, attributes: dict[str, str | int], names: Sequence[str] = ()) -> None:
     """Write samples (height, width, channels) as the picture file that the path's ending names.
 
     Args:
         path: The file.
         samples: Of any type that the format has.
-        attributes: Metadata, {name: text}.
+        attributes: Metadata and the format's settings, by OpenImageIO's names.
         names: Of the channels; empty: the usual ones.
 
     Raises:
@@ -70,8 +72,8 @@ def _write(path: Path, samples: np.ndarray, attributes: dict[str, str], names: S
     kind = {"float16": "half", "float32": "float"}.get(samples.dtype.name, samples.dtype.name)
     spec = OpenImageIO.ImageSpec(width, height, channels, kind)
     spec.channelnames = tuple(names) or spec.channelnames
-    for name, text in attributes.items():
-        spec[name] = text
+    for name, value in attributes.items():
+        spec[name] = value
     try:
         with atomic_write.writing(path) as part:
             name = check_name(part)

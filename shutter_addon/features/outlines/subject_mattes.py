@@ -418,6 +418,7 @@ class SubjectMattes(CarriedMattes):
             around = [self._keys[end] for end in nearest(frame, self._showing) if end is not None]
             self._keys[frame] = derived.key({"strokes": self._keys[frame], "around": around})
         self._before: tuple[int, np.ndarray, np.ndarray] | None = None
+        self._written: tuple[Path, np.ndarray] | None = None
 
     def read(self, index: int) -> np.ndarray:
         """Return a frame's matte (height, width) float32, 0 to 1. If it is not kept yet, make it and its chain.
@@ -490,8 +491,15 @@ class SubjectMattes(CarriedMattes):
     def _write(self, frame: int, end: int, matte: np.ndarray, excluded: np.ndarray, sure: float) -> None:
         levels = flow.levels(matte)
         levels[levels == EXCLUDED] = EXCLUDED + 1
-        levels[(levels < EXCLUDED) & (_fitted(excluded, levels) > 0.5)] = EXCLUDED
-        write_levels(self._path(frame, end, None), levels, f"{CONFIDENCE}{sure:.3f}")
+        if excluded.any():
+            levels[(levels < EXCLUDED) & (_fitted(excluded, levels) > 0.5)] = EXCLUDED
+        path = self._path(frame, end, None)
+        write_levels(path, levels, f"{CONFIDENCE}{sure:.3f}")
+        self._written = path, levels
+
+    def _kept(self, path: Path) -> np.ndarray | None:
+        # The last one is read again for the frame after it, and need not be decoded.
+        return self._written[1] if self._written and self._written[0] == path else super()._kept(path)
 
     def _first(self, frame: int) -> tuple[np.ndarray, np.ndarray, float]:
         """Make the matte of a keyframe (with strokes or a drawing), at which a chain of mattes begins.
@@ -529,7 +537,9 @@ class SubjectMattes(CarriedMattes):
             return self._nothing(), self._nothing(), GONE
         (_, old), (picture, small) = (self._pictures(each) for each in (before, frame))
         size = small.shape[1::-1]
-        excluded = flow.resized((matte == EXCLUDED).astype(np.float32), size)
+        hidden, excluded = matte == EXCLUDED, np.zeros(small.shape[:2], np.float32)
+        if hidden.any():
+            excluded = flow.resized(hidden.astype(np.float32), size)
         share = flow.resized(matte, size).astype(np.float32) / 255
         what, still = followed(self._network, old, small, Found(share, excluded, sure))
         found_there = refined(picture, what.share)
