@@ -110,11 +110,14 @@ def _before_render(scene: Scene, *_) -> None:
 
 
 def _prepare(film: int, in_job: bool) -> bool:
-    """Bring all effects up to date on the main thread before a film is rendered, whatever thread renders.
+    """Bring all effects up to date before Blender renders a film: an edit with effects, or one picture of it.
+
+    Called on the main thread, even if another thread renders.
 
     Args:
         film: session_uid of the rendered scene.
-        in_job: Whether a thread of Blender's window renders, for which all effects are read now (job_snapshots).
+        in_job: Whether a render job in Blender's window renders, in another thread. All effects are then read now,
+            before it starts (job_snapshots).
 
     Returns:
         True, which tells the waiting thread that it is done.
@@ -154,12 +157,16 @@ def _after_render(scene: Scene, *_) -> None:
 
 
 def _uncaught(before: Callable, kind: type, error: BaseException, trace: TracebackType | None) -> None:
-    """Keep an error of the extension for *Copy Report*, then print it as before. Installed as sys.excepthook.
+    """Keep an error for *Copy Report* if the extension's code was involved, then print it as before.
 
-    Blender calls that for what operators, panels, handlers and timers raise. Nothing else gets all.
+    Installed as sys.excepthook: the one place where Blender hands over the errors of all operators, panels, handlers
+    and timers.
 
     Args:
-        before: The hook that was installed before, which prints errors.
+        before: The hook that was installed before.
+        kind: The error's type.
+        error: The error.
+        trace: The error's traceback.
     """
     recent_errors.exception(error)
     before(kind, error, trace)

@@ -27,12 +27,13 @@ _ROWS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
 
 
 def composition(way: str, groups: int, **macros: int | str) -> Pass:
-    """Return a compute pass that composes pictures: compose_<way> of shaders/.
+    """Return a compute pass that composes pictures: the shader compose_<way> with the macros that it needs.
 
     Args:
         way: A name from `way_of` or `moved_way`.
-        groups: The number of groups of four shutters.
-        macros: More macros of the shader. They replace those that this function sets.
+        groups: The number of groups of four shutters: ⌈shutters / 4⌉.
+        macros: {name: value} of further macros of the shader. They replace those that this function sets: GROUPS, VALUE
+            and QUADS.
     """
     lines = lines_of(way, is_median=macros.get("COMBINE") == MODES["median"])
     given: dict[str, int | str] = {"GROUPS": groups, "VALUE": int(way == "value"), "QUADS": lines // 4}
@@ -40,27 +41,34 @@ def composition(way: str, groups: int, **macros: int | str) -> Pass:
 
 
 def lines_of(way: str, *, is_median: bool) -> int:
-    """Return how many rows of pixels one shader invocation of a composition pass composes.
+    """Return how many rows of pixels one invocation of a composition shader composes, if no exposure follows a motion.
 
     Args:
-        way: The pass, a name from `way_of`.
-        is_median: Whether the pass makes a median of frames.
+        way: The shader's name without compose_, from `way_of`.
+        is_median: Whether it makes a median of frames.
     """
     return 4 if is_median else _LINES.get(way, BLOCK)
 
 
 def way_of(window: Window, state: FrameState, values: np.ndarray, shortened: bool) -> str:
-    """Return the fastest way to compose a picture: the name of a pass in shaders/, without compose_.
+    """Return the fastest way to compose a picture without motions: the name of a shader, without compose_.
 
-    The limits come from times at 1080p, for 2 to 8 shutters and windows of 16 to 64 frames. With running sums, in
+    The thresholds come from times at 1080p, for 2 to 8 shutters and windows of 16 to 64 frames. With running sums, in
     multiples of a plain average of 16 frames: "sums" takes 0.3 + 0.23 · pieces, "frames" 1 + 0.1 · frames. With frames,
-    in multiples of a plain average of the window: "pieces" takes 1.5 + 1.4 · pieces / frames, "frames" 2.1 to 2.8.
+    in multiples of a plain average of the window: "pieces" takes 1.5 + 1.4 · pieces / frames, "frames" 2.1 to 2.8. (A
+    piece is a row of the table, see the module.)
 
     Args:
-        window: The window, which holds running sums or frames.
-        state: The effect, with shutters that combine frames in one way.
+        window: Where the source frames are stored. An instance of Sums has running sums, any other has frames.
+        state: The effect. All its shutters combine frames in the same way (FrameState.groups has one entry).
         values: The table of shutters, from `table`.
-        shortened: Whether exposed frames are missing (edges "shorten").
+        shortened: Whether edges are "shorten" and shutters expose frames beyond the shot's ends, which are then left
+            out.
+
+    Returns:
+        "value" for value interpolation. Otherwise "sums" (few pieces, from running sums), "pieces" (few pieces, from
+        frames), "frames" (many pieces) or "search" (medians, and where "frames" would take too many loop iterations for
+        llvmpipe).
     """
     if state.options.interpolation == "value":
         return "value"
@@ -78,18 +86,19 @@ def way_of(window: Window, state: FrameState, values: np.ndarray, shortened: boo
 
 
 def moved_way(state: FrameState, values: np.ndarray, motions: int, mixed: int, quads: int) -> tuple[str, int]:
-    """Choose the pass that composes a picture whose shutters follow a motion, within the limit of loop iterations.
+    """Choose the shader that composes a picture whose shutters follow a motion, within llvmpipe's limit of iterations.
 
     Args:
         state: The effect.
-        values: The table of shutters from moved_tables, without the rows of motions.
-        motions: The number of motions for each frame.
-        mixed: How many motions a pixel mixes: MIXED of shaders/include/moved.glsl.
-        quads: The most groups of four pixels that one shader invocation may compose.
+        values: The table of shutters from moved_tables, without its last `motions` rows.
+        motions: The number of motions for each frame: 1 by displacement; by value, how many different ones shutters
+            have.
+        mixed: How many motions each pixel averages: all N of the shutters by displacement, 1 by value.
+        quads: How many groups of four pixels above one another an invocation shall compose.
 
     Returns:
-        The name of the pass without compose_, and how many groups an invocation composes: `quads`, or 1 if those take
-        too many iterations.
+        The shader's name without compose_: "value", "frames" or "search"; and how many groups of four pixels an
+        invocation composes: `quads`, or 1 if that takes too many iterations.
     """
     span = state.open_span
     frames = span[1] - span[0]
@@ -103,17 +112,29 @@ def moved_way(state: FrameState, values: np.ndarray, motions: int, mixed: int, q
 
 
 def filled_rows(rows: int) -> float:
-    """Return the smallest number of pieces, at least `rows`, for which the pass compose_sums is compiled.
+    """Return to how many pieces a table must be filled up: compose_sums is compiled only for some numbers of pieces.
 
-    It is infinity if there is none.
+    Args:
+        rows: The number of pieces that the table has.
+
+    Returns:
+        The smallest number in _ROWS that is at least `rows`; infinity if `rows` is larger than all.
     """
     return next((filled for filled in _ROWS if filled >= rows), np.inf)
 
 
 def knots(values: np.ndarray) -> np.ndarray:
-    """Convert the table of shutters from `table` to the table of knots that shaders/compose_sums.glsl reads.
+    """Convert a table of shutters by displacement to the table of knots that shaders/compose_sums.glsl reads.
 
-    Row 0 has the gains. Each other row is a knot: the end of a piece, or a start that differs from the end before it.
+    Knots are the times between which the quantiles are linear: the start of each piece, unless it is the end of the
+    piece before, and its end.
+
+    Args:
+        values: From `table`: (1 + pieces, 2 G + 1, 4), for G groups of four shutters.
+
+    Returns:
+        (1 + knots, G + 1, 4) float32. Row 0: the gains in G texels. Each other row is a knot: its time for each shutter
+        in G texels; then for an end, the last texel of its piece (`table`), for a start zeros.
     """
     groups = values.shape[1] // 2
     rows = np.zeros((len(values), 2, groups + 1, 4), np.float32)
@@ -131,13 +152,23 @@ def padded(values: np.ndarray) -> np.ndarray:
 
 
 def table(state: FrameState) -> np.ndarray:
-    """Return the table of shutters (1 + rows, columns, 4) float32 that passes read (shaders/include/compose.glsl).
+    """Return the table of shutters as float32 texels, which shaders/include/compose.glsl reads.
 
-    Row 0 has the gains. For lightest and darkest, they scale the highest weight to 1 (core.pixels.compositor); by
-    value, they are the shutters' mean times. By displacement, there is a row for each piece of the quantiles: starts,
-    ends, then dz, the most by which the shutters' times differ at either, and z, the
-    fraction of the exposure (0 to 1), at its start. By value, there is a row of weights for each frame of the open
-    span.
+    A texel has the numbers of four shutters; N shutters have G = ⌈N / 4⌉ texels. Times are in frames of the window.
+
+    Args:
+        state: The effect. All its shutters combine frames in the same way.
+
+    Returns:
+        By displacement (1 + pieces, 2 G + 1, 4), by value (1 + frames, G, 4).
+        Row 0 has a number for each shutter. It is the factor of its brightness (FrameState.gains) for averages and
+            medians. For lightest and darkest it is, by displacement, the factor that scales the shutter's highest
+            weight to 1 (core.pixels.compositor), and by value the shutter's mean time.
+        By displacement, each further row is a piece of the quantiles: G texels of start times, G texels of end times,
+            and the texel (dz, apart, z, 0). z is the share of the exposure (0 to 1) at the piece's start, dz the
+            piece's own share, and apart the largest difference between shutters in their start times or in their end
+            times.
+        By value, each further row is a frame of FrameState.open_span, with the shutters' weights (`_bars`).
     """
     by_pieces, bars = state.options.interpolation == "displacement", state.bars
     rows = _pieces(bars.tobytes(), bars.dtype, bars.shape) if by_pieces else _bars(state)
@@ -150,9 +181,12 @@ def table(state: FrameState) -> np.ndarray:
 
 @lru_cache(16)
 def _pieces(content: bytes, dtype: np.dtype, shape: tuple[int, ...]) -> np.ndarray:
-    """Return the rows of `table` for the pieces of shutters, whose bars are given as bytes, dtype and shape.
+    """Return the rows of `table` by displacement: (pieces, 2 G + 1, 4), as described there.
 
-    They are cached, because bars seldom change from frame to frame.
+    The last results are kept, because bars seldom change from frame to frame. Arguments are hashable for that.
+
+    Args:
+        content, dtype, shape: FrameState.bars, an array (N, L), as its bytes, type and shape.
     """
     knots = shutters.knots(np.frombuffer(content, dtype).reshape(shape))
     start, end = padded(knots.start), padded(knots.end)
@@ -175,9 +209,11 @@ def _gains(state: FrameState) -> np.ndarray:
 
 
 def _bars(state: FrameState) -> np.ndarray:
-    """Return the rows of `table` by value: the weight of each frame of the open span, for each shutter.
+    """Return the rows of `table` by value: how much each frame counts for each shutter.
 
-    A shutter's weights sum to 1; for lightest and darkest, the highest is 1 instead.
+    Returns:
+        (frames, G, 4): a row for each frame of FrameState.open_span, four shutters to a texel. A shutter's weights sum
+        to 1; for lightest and darkest, its highest is 1 instead.
     """
     (combine,) = state.groups
     whole = state.bars.max(axis=1) if combine.mode in ("lightest", "darkest") else state.bars.sum(axis=1)
@@ -185,19 +221,23 @@ def _bars(state: FrameState) -> np.ndarray:
 
 
 def moved_tables(state: FrameState, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the table of shutters and that of motions for a picture whose shutters follow something.
+    """Return the tables of shutters and of motions, for a picture whose shutters follow a motion.
 
-    Passes read them as in shaders/include/moved.glsl; the caller adds in which layer of a texture each frame is. By
-    displacement there is one motion, which mixes those of the shutters. By value there is one for all shutters that
-    move alike, and the table of shutters has a row for each frame and motion. A row for each motion follows: 1 for its
-    shutters.
+    shaders/include/moved.glsl reads them. By displacement, a pixel averages the motions of its N shutters: it is one
+    motion per frame. By value, shutters that move alike share a motion: M motions per frame, each with weights for its
+    own shutters.
 
     Args:
-        state: The effect.
-        frames: The window's source frames (L,), −1 where one is missing.
+        state: The effect. Its `following` is not None.
+        frames: The source frame (L,) at each place of the window; −1 where one is left out.
 
     Returns:
-        The table of shutters, and the motions (L · motions, 1 + N, 4) float32; by value (L · motions, 2, 4).
+        The table of shutters: that from `table`, by value with M rows for each frame of the open span; then a row for
+            each motion, 1 for the shutters that have it and 0 for the others.
+        The motions: float32 (L, 1 + N, 4) by displacement, (L · M, 2, 4) by value; a row for each frame and motion, all
+            motions of a frame together. The first texel has the frame's layer, which the caller sets, then 1 if the
+            frame is there, else 0. Further texels: (turn − 1) and shift (Following), both as real and imaginary part,
+            of each shutter, or by value of the motion.
     """
     assert state.following is not None
     turns, shifts = state.following.at(frames)

@@ -27,13 +27,14 @@ Moves = tuple[np.ndarray, np.ndarray]
 
 
 class HostWindow:
-    """The source frames that a picture exposes, in the host's memory.
+    """A window (window.Window) of CPUCompositor: the source frames that a picture exposes, in main memory.
 
     Attributes:
-        is_open, sends: As for window.Window.
+        is_open: True: it can always load frames.
+        sends: False: frames are not sent to a device.
         source: The footage.
-        shot: The source frames that may be shown.
-        frames: The loaded frames (H, W, 4), by index.
+        shot: The source frames that may be exposed, from the last call of `load`.
+        frames: {source frame: its pixels (H, W, 4), as FrameSource.read returns them}.
     """
 
     is_open, sends = True, False
@@ -56,17 +57,21 @@ class HostWindow:
             self.frames[index] = self.source.read(index)
 
     def seen(self, indices: np.ndarray, tile: Tile, moves: Moves | None) -> tuple[list[np.ndarray], Moves | None]:
-        """Return the parts of frames that a tile of the picture shows, for `compositor.compose`.
+        """Return what one tile of the picture needs from each frame, as arguments of core.pixels.compositor.compose.
 
         Args:
-            indices: (L,) source frames. One that is not loaded is not exposed, and becomes one black pixel.
-            tile: The tile's rows and columns.
-            moves: (turns, shifts), complex (L, N), for each frame and shutter: a point z of the picture lies in the
-                frame at turn · z + shift. None: nothing is followed.
+            indices: (L,) source frame at each place of the window. For one that is not loaded, or −1, one black pixel
+                is returned; the caller exposes none of it.
+            tile: The tile's rows and columns in the picture.
+            moves: (turns, shifts), complex (L, N), for each frame and shutter: a point z of the picture lies at turn ·
+                z + shift in the frame (motions.Similarity). None: no exposure follows a motion.
 
         Returns:
-            Frames (h, w, 4) in linear light, premultiplied: the tile's pixels, or all that a following exposure reads;
-            and the turns and shifts from the tile's pixels to those.
+            A list of L parts of frames (h, w, 4) in linear light, premultiplied. Without `moves` it is the tile. With
+                them it is the rectangle that covers the tile in the frame under every shutter's motion, plus 3 pixels,
+                clipped at the frame's edges.
+            The moves from points of the tile to those of the parts, each counted from the first pixel of its array;
+                None if `moves` is None.
         """
         if moves is None:
             parts, moved = [tile] * len(indices), None
@@ -109,7 +114,10 @@ def _tiles(source: FrameSource) -> Iterator[Tile]:
 
 
 class CPUCompositor:
-    """Composes pictures with NumPy. It has the methods of request.Compositor and of request.Stages."""
+    """Composes pictures with NumPy, on machines without a GPU. It implements request.Compositor and request.Stages.
+
+    Pictures and coefficients are NumPy arrays, windows are HostWindow.
+    """
 
     name = "NumPy"
     takes_planes = False
@@ -173,12 +181,15 @@ class CPUCompositor:
         return self.over_black(picture) if levels else picture
 
     def draw(self, window: HostWindow, request: Request, coefficients: Coefficients) -> np.ndarray:
-        """Return the picture (H, W, 4), top row first: float32 in linear light, or levels in uint8.
+        """Return the picture (H, W, 4), top row first: float32 scene-linear, or with request.levels uint8.
 
         Args:
-            window: The window, which has loaded all exposed frames.
-            request: The picture.
+            window: The window, in which all frames that the picture exposes must be loaded.
+            request: The picture. Its strokes, mattes and layers are not looked at.
             coefficients: How much of each shutter a pixel gets.
+
+        Raises:
+            StoppedError: The calling thread's work was cancelled.
         """
         state, source = request.state, window.source
         indices = windows.indices(state.options, request.index, window.shot, request.direction)

@@ -27,14 +27,14 @@ NOTHING = 1 / 4096
 def diffuse(labels: np.ndarray, count: int, guide: np.ndarray | None = None, strength: float = 0.0) -> np.ndarray:
     """Return how much of each shutter a pixel gets: coefficients (count, H, W) float32, at least 0, with a sum of 1.
 
-    Without any scribble, every pixel gets the first shutter.
+    A shutter that is not drawn gets 0 everywhere, except that without any scribble every pixel gets shutter 0.
 
     Args:
         labels: (H, W): 0 where a pixel is free, 1 + shutter where that shutter is drawn.
         count: The number of shutters.
-        guide: The picture whose edges stop the diffusion, (h, w, 3 or more), as for core.pixels.conductances; its cells
-            are 1, 2, 4, … pixels wide. None: nothing stops it.
-        strength: 0 to 1, how strictly edges stop it.
+        guide: A reduced or full-size picture whose edges stop the diffusion, (h, w, 3 or more), as for
+            core.pixels.conductances. Its cells are 1, 2, 4, … pixels wide. None: nothing stops the diffusion.
+        strength: How strictly edges stop it, from 0 (not at all) to 1.
     """
     drawn = np.flatnonzero(np.bincount(labels.ravel(), minlength=count + 1)[1:])  # the others are 0 everywhere
     coefficients = np.zeros((count, *labels.shape), np.float32)
@@ -54,13 +54,13 @@ def diffuse(labels: np.ndarray, count: int, guide: np.ndarray | None = None, str
 
 
 class _Grid(NamedTuple):
-    """The equations of a grid (h, w) of cells.
+    """The linear equations of a grid (h, w) of cells, whose values are unknown except in fixed cells (drawn ones).
 
     Attributes:
-        across: Conductances between a cell and the one to its right, (h, w − 1).
-        down: Conductances between a cell and the one below, (h − 1, w).
-        ground: Conductances between cells and fixed cells, (h, w).
-        inverse: 1 / the sum of a cell's conductances, 0 for fixed cells.
+        across: The conductance between each cell and the one to its right, (h, w − 1); 0 if either is fixed.
+        down: The conductance between each cell and the one below, (h − 1, w); 0 if either is fixed.
+        ground: The sum of a cell's conductances to fixed cells, (h, w).
+        inverse: 1 / the sum of all conductances of a cell, (h, w); 0 if that sum is 0, as in fixed cells.
     """
 
     across: np.ndarray
@@ -70,13 +70,15 @@ class _Grid(NamedTuple):
 
 
 def _solved(labels: np.ndarray, shutters: np.ndarray, across: np.ndarray, down: np.ndarray) -> np.ndarray:
-    """Return the coefficients (N, H, W) of some shutters by conjugate gradients, with small errors, not clipped.
+    """Compute the coefficients (N, H, W) of some shutters by conjugate gradients.
+
+    They have small errors, and can lie slightly outside 0 to 1.
 
     Args:
         labels: As for `diffuse`.
-        shutters: (N,) indices.
-        across: (H, W − 1), conductances to the pixel on the right.
-        down: (H − 1, W), conductances to the pixel below.
+        shutters: (N,) indices of the shutters.
+        across: (H, W − 1), conductances between each pixel and the one to its right.
+        down: (H − 1, W), conductances between each pixel and the one below.
     """
     free = labels == 0
     ground = _inflow(across, down, (~free).astype(np.float32)) * free
@@ -111,9 +113,17 @@ def _grid(across: np.ndarray, down: np.ndarray, ground: np.ndarray) -> _Grid:
 
 
 def _inflow(across: np.ndarray, down: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return what flows into each cell (…, h, w) from its neighbors, for the cells' values (…, h, w).
+    """Return the net flow into each cell (…, h, w) from its four neighbors.
 
-    A flow is a conductance times a difference of values, so what leaves a cell enters another one exactly.
+    The flow between two cells is their conductance times the difference of their values. It is added to one and
+    subtracted from the other, so that the sum over all cells is exact.
+
+    Args:
+        across, down: As for `_Grid`.
+        values: The values of cells (…, h, w).
+
+    Raises:
+        StoppedError: The calling thread's work was cancelled.
     """
     stopping.check()
     flow = np.zeros_like(values)
@@ -132,10 +142,12 @@ def _missing(grid: _Grid, values: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 
 def _cycle(grids: list[_Grid], right: np.ndarray) -> np.ndarray:
-    """Return an approximate solution (N, h, w) of the first grid's equations, by a multigrid cycle.
+    """Return an approximate solution (N, h, w) of the first grid's equations, by one multigrid V-cycle.
+
+    It serves as the preconditioner of the conjugate gradients.
 
     Args:
-        grids: The grid and the coarser ones.
+        grids: The grid and all coarser ones, the coarsest of one cell last.
         right: The right-hand side (N, h, w).
     """
     grid, *below = grids

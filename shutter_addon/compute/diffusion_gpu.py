@@ -49,10 +49,15 @@ HOLD = 0.3
 
 
 def operators(ties: str) -> dict[str, Pass]:
-    """Return the passes of shaders/multigrid.glsl, by name in small letters, for one way in which cells are coupled.
+    """Return the passes of shaders/multigrid.glsl for one way in which cells are coupled.
 
     Args:
-        ties: "STENCIL" for coarse cells, "LABELS" for pixels, "LINKS" for pixels whose couplings follow edges.
+        ties: How neighboring cells are coupled: "STENCIL" by nine-point operators (coarser grids), "LABELS" equally
+            between free pixels, "LINKS" by conductances between pixels that are small at edges.
+
+    Returns:
+        {name: pass}. "weights" computes the prolongation P, "coarsen" the operator PᵀAP of the next coarser grid,
+        "smooth" does a part of a Gauss-Seidel sweep, and "restrict" makes the next coarser grid's right-hand side.
     """
     return {
         name: read_pass("multigrid", name.upper(), **{ties: 1}) for name in ("weights", "coarsen", "smooth", "restrict")
@@ -75,27 +80,30 @@ _RANGES |= {"anew": (4, 5), "feeding": (5, 6), "changed": (6, 7)}
 
 
 class _Grid:
-    """The textures of a multigrid's grid, and which of its tiles passes have to go through.
+    """One grid of the multigrid: its textures, and the tiles that passes go through. For U, W, f, A, P see the module.
 
-    The textures are rgba32f, except the labels:
-        solution, own, right: U, W and f, four shutters per layer; the finest grid has no f
-        stencil: the operator A; the finest grid has r32ui labels instead
-        weights: P, how much each cell takes of the coarse cells around it
-
-    Tiles of the last solve, as bool arrays (rows, columns):
-        reached: tiles of 8 × 8 cells within BAND tiles of a scribble; up to WHOLE cells, all tiles
-        touched: tiles of 4 × 4 cells with a scribble in or beside them
-        solid: tiles of 4 × 4 cells with no free cell in or around them
-
-    `ranges` tells where each list of tiles lies in the texture of all lists: {list: (first, last)}. Tiles have 8 × 8
-    cells, except those of the last two lists:
-        near: tiles with free cells that this grid solves
-        reached: near tiles and those around them, where W still has an effect
-        far: tiles with free cells that are not reached; their values come from the next grid
-        rim: tiles that are not near, at the ends of rows or columns that go beyond the next grid's last cells
-        anew: tiles where values of the last solve may be left
-        feeding: near tiles and those around them, as tiles of 4 × 4 cells of the next grid
-        changed: tiles of 4 × 4 cells whose operator may differ from that of the last solve
+    Attributes:
+        size: (width, height) in cells.
+        layers: Layers of four shutters.
+        finest: Whether its cells are pixels.
+        textures: {name: texture}, rgba32f but for the labels:
+            solution, own, right: U, W and f, four shutters per layer; the finest grid has no f
+            stencil: the operator A; instead, the finest grid has "labels" (r32ui), and in EdgeDiffusion "links"
+            weights: P, how much each cell takes of the four coarse cells around it
+        reached: Of the last solve, bool (rows, columns): tiles of 8 × 8 cells within BAND tiles of a scribble; all
+            tiles of a grid that is solved everywhere.
+        touched: Likewise, tiles of 4 × 4 cells with a scribble in or beside them.
+        solid: Likewise, tiles of 4 × 4 cells without a free cell in them or near them.
+        codes: For all tiles of 8 × 8 and of 4 × 4 cells, the numbers by which shaders know them (_codes).
+        ranges: {list: (first, last)}: where each list of tiles lies in the texture that has the lists of all grids.
+            Tiles have 8 × 8 cells, except those of the last two lists:
+            near: tiles that this grid solves: those with free cells, on coarser grids also those beside them
+            reached: near tiles and those around them, where W still has an effect
+            far: tiles with free cells that are not reached; their values come from the next grid
+            rim: tiles that are not near, at the ends of rows or columns that go beyond the next grid's last cells
+            anew: tiles that _start has to set, since the last solve may have left values there
+            feeding: near tiles and those around them, as tiles of 4 × 4 cells of the next grid
+            changed: tiles of 4 × 4 cells whose operator may differ from that of the last solve
     """
 
     def __init__(self, device: Device, width: int, height: int, layers: int, finest: bool) -> None:
@@ -117,9 +125,13 @@ class _Grid:
 
 
 class Diffusion:
-    """Solves for how much of each shutter a pixel gets, as it spreads from drawn strokes, on a device.
+    """Computes on a device how much of each shutter a pixel gets, as shutters spread from drawn strokes.
 
-    Its textures are kept until the size or the number of shutters changes.
+    Its textures are reused until the size or the number of shutters changes.
+
+    Attributes:
+        finest: The passes for the finest grid, whose cells are pixels (`operators`).
+        returns: Whether smoothing after a coarse correction visits the colors in reverse order.
     """
 
     finest = operators("LABELS")  # the passes over pixels
@@ -138,11 +150,13 @@ class Diffusion:
         Args:
             labels: (H, W) uint16: 0 where a pixel is free, 1 + shutter where that shutter is drawn.
             count: The number of shutters.
-            warm: Start from the last solution, if it has this size and count. It is faster if scribbles moved a little,
-                and the result depends on the last solution, within the error.
+            warm: Start from the solution of the last call, if it was finished and had this size and count. This is
+                faster, for scribbles that have moved a little. The result then depends on the last solution, within the
+                error.
 
         Returns:
-            A texture array rgba32f, shutter i in layer i // 4 and channel i % 4. The next call overwrites it.
+            A texture array rgba32f, top row first: shutter i in layer i // 4 and channel i % 4. The next call
+            overwrites it.
         """
         warm = self._prepare(labels.shape, count) and warm
         finest, made_for = self._grids[0], self._made_for
@@ -166,10 +180,15 @@ class Diffusion:
         self._grids, self._made_for = [], None
 
     def _prepare(self, shape: tuple[int, ...], count: int) -> bool:
-        """Make the grids for pictures of a size (H, W) and a number of shutters, unless the present ones suit.
+        """Make new grids for a size and a number of shutters, unless the present ones were made for the same.
+
+        Args:
+            shape: The picture's (H, W).
+            count: The number of shutters.
 
         Returns:
-            True if the present grids suit: they hold the last solution. False if the grids are new.
+            True if the grids are kept, with the last solution; False if they are new (also after an interrupted
+            Diffusion.solve).
         """
         height, width = shape
         if self._made_for == (width, height, count):
@@ -186,12 +205,15 @@ class Diffusion:
         return False
 
     def _list_tiles(self, labels: np.ndarray, whole: int, *, anew: bool = False) -> None:
-        """Find out which tiles each pass has to go through, and send lists of them to the device (see _Grid).
+        """List the tiles that each pass has to go through, and send the lists to the device.
+
+        This sets `ranges` and the other attributes of tiles of all grids (_Grid).
 
         Args:
             labels: (H, W), as for `solve`.
-            whole: The number of the first grid that is solved in all tiles.
-            anew: Whether all operators have changed since the last solve.
+            whole: The index of the finest grid that is solved in all tiles, as are all coarser ones. Finer grids are
+                solved near scribbles.
+            anew: Whether all tiles have to be set and all operators made again, regardless of the last solve.
         """
         held, free = _in_fours(labels != 0)
         listed, end = [], 0
@@ -224,10 +246,12 @@ class Diffusion:
         self._device.write(self._tiles, rows)
 
     def _start(self, warm: int) -> None:
-        """Set the values from which the solve starts, and clear what other scribbles left.
+        """Set the values from which the solve starts in all grids, and clear W and f where the last solve left any.
+
+        Fixed pixels get the coefficients of their labels in any case.
 
         Args:
-            warm: 1: keep the last solution as the start; 0: start from nothing.
+            warm: 1: free pixels keep the last solution, and coarser grids take it over. 0: both start from 0.
         """
         finest = self._grids[0]
         self._run(_START, finest, "anew", 64, finest.layers, warm=warm)
@@ -274,38 +298,39 @@ class Diffusion:
         self._prolong(grid, coarse, tiles, {"from": grid.textures["own"], "to": grid.textures["solution"]}, 1.0)
 
     def _prolong(self, grid: _Grid, coarse: _Grid, tiles: str, images: dict[str, Texture], amount: float) -> None:
-        """Set an image of a grid to another one plus the interpolated solution of the next coarser grid.
+        """Compute to = from + amount · P U', where U' is the solution of the next coarser grid and P the interpolation.
 
         Args:
-            grid: The grid.
+            grid: The grid with the two images.
             coarse: The next coarser grid.
-            tiles: As for `_run`.
-            images: {"from": the other image, "to": the image}.
-            amount: The factor of the solution.
+            tiles: The tiles of `grid` to compute, as for `_run`.
+            images: {"from": texture, "to": texture}.
+            amount: The factor of the interpolated solution.
         """
         coarser = {"coarse": coarse.size, "coarser": coarse.textures["solution"]}
         self._run(_PROLONG, grid, tiles, 16, grid.layers, **coarser, **images, amount=amount)
 
     def _restrict(self, grid: _Grid, coarse: _Grid, own: Texture) -> None:
-        """Make the right-hand side of the next coarser grid from the residual of a grid's values, as multigrid does.
+        """Set the right-hand side of the next coarser grid to Pᵀ(f − A · own), from the residual of a grid's values.
 
         Args:
-            grid: The grid.
+            grid: The grid, with f, A and P.
             coarse: The next coarser grid.
-            own: The values.
+            own: The texture with the values: W, or all of U.
         """
         to = {"coarse": coarse.size, "next": coarse.textures["right"]}
         self._run(self._pass(grid, "restrict"), grid, "feeding", 16, grid.layers, own=own, **to)
 
     def _smooth(self, grid: _Grid, sweeps: int, *, back: bool = False) -> None:
-        """Run Gauss-Seidel sweeps over a grid, which smooth the error of its solution.
+        """Run Gauss-Seidel sweeps over a grid's near tiles, which reduce the fine-scale error of its solution.
 
-        They are red-black at full size, where cells have four neighbors, else in four colors.
+        Cells are updated one color after another: in two colors like a chessboard at full size, where a cell has four
+        neighbors, else in four colors, for eight neighbors.
 
         Args:
             grid: The grid.
-            sweeps: Their number.
-            back: Whether colors come in the opposite order.
+            sweeps: The number of sweeps.
+            back: Whether the colors come in reverse order.
         """
         cells: int = 32
         colours: list[int | tuple[int, int]] = [0, 1]
@@ -334,15 +359,15 @@ class Diffusion:
                 self._run(_EXPAND_RIM, grid, "rim", 16, **below, beyond=beyond)
 
     def _run(self, program: Pass, grid: _Grid, tiles: str, cells: int, layers: int = 1, **extra: Any) -> None:
-        """Run a pass over a list of the grid's tiles.
+        """Run a pass over a list of a grid's tiles. Do nothing if the list is empty.
 
         Args:
-            program: The pass.
+            program: The pass. It gets the grid's textures and sizes by name, as far as it has them.
             grid: The grid.
-            tiles: The list, a key of _Grid.ranges.
+            tiles: The name of the list, a key of _Grid.ranges.
             cells: Invocations for each tile.
-            layers: Layers of four shutters.
-            extra: Textures and constants besides the grid's, by name.
+            layers: The number of layers (of four shutters) to run it on.
+            extra: Further textures and constants of the pass, by name. They replace those of the grid.
         """
         first, last = grid.ranges[tiles]
         if first == last:
@@ -361,10 +386,14 @@ class Diffusion:
 
 
 def _in_fours(fixed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return which tiles of 4 × 4 cells have fixed cells, and which have free ones: bool (rows, columns) each.
+    """Divide cells into tiles of 4 × 4. Return which tiles contain fixed cells, and which contain free ones.
 
     Args:
-        fixed: The cells, (H, W) bool. Beyond the edges they repeat.
+        fixed: (H, W) bool: which cells are fixed. Incomplete tiles at the edges are filled with the last row and
+            column.
+
+    Returns:
+        Two arrays bool (⌈H/4⌉, ⌈W/4⌉): tiles with a fixed cell, and tiles with a free cell.
     """
     height, width = fixed.shape
     if height % 4 or width % 4:
@@ -376,19 +405,23 @@ def _in_fours(fixed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _codes(rows: int, columns: int, fours: int) -> np.ndarray:
-    """Return the numbers by which shaders know tiles, (rows, columns) float32: x + 4096 · y of a tile's first cell.
+    """Return the numbers by which shaders know tiles: x + 4096 · y for the first cell (x, y), in units of four cells.
 
     Args:
-        rows, columns: The number of tiles.
-        fours: A tile's side in units of four cells. x and y have the same unit.
+        rows, columns: The number of tiles down and across.
+        fours: A tile's side in units of four cells: 2 or 1.
+
+    Returns:
+        (rows, columns) float32.
     """
     return (fours * (np.arange(columns) + 4096 * np.arange(rows)[:, None])).astype(np.float32)
 
 
 def _last_ones(grid: _Grid) -> np.ndarray:
-    """Return which tiles (rows, columns) go beyond the last cells of the next coarser grid.
+    """Return which tiles contain cells that lie beyond the last cells of the next coarser grid, bool (rows, columns).
 
-    They are the last column if the grid's width in cells is even, and the last row if its height is even.
+    Coarse cells lie on the even cells. So these are the last column of tiles if the grid's width in cells is even, and
+    the last row if its height is even.
     """
     width, height = grid.size
     last = np.zeros_like(grid.reached)

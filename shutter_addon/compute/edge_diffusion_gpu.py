@@ -44,9 +44,9 @@ _SUM = read_pass("edge_diffusion", "SUM")
 
 
 class EdgeDiffusion(Diffusion):
-    """Solves for how much of each shutter a pixel gets, as it spreads from drawn strokes up to edges of the picture.
+    """Computes how much of each shutter a pixel gets, as shutters spread from strokes up to edges of the picture.
 
-    It runs on a device, and differs from Diffusion by other passes for pixels, and by conjugate gradients on one grid.
+    It runs on a device. It differs from Diffusion by other passes for pixels, and by conjugate gradients on one grid.
     """
 
     finest = operators("LINKS")
@@ -58,13 +58,14 @@ class EdgeDiffusion(Diffusion):
         self._solved, self._sweeps, self._iterations = 0, 0, 0
 
     def solve(self, labels: np.ndarray, count: int, guide: np.ndarray, strength: float) -> Texture:  # type: ignore[override]  # it has a guide
-        """Return how much of each shutter a pixel gets, like compute.diffusion.diffuse with a guide, on the device.
+        """Return how much of each shutter a pixel gets, as compute.diffusion.diffuse does with a guide, on the device.
 
-        It does not depend on earlier solves. Some pixels must be drawn on, and some free. If the guide's cells are
-        pixels, one number is read back after each cycle: whether it was enough.
+        The result does not depend on earlier calls. If the guide has one cell per pixel, this reads back the largest
+        change after each cycle, to end when it is small enough. If cells are larger, the number of cycles is fixed.
 
         Args:
-            labels, count: As for Diffusion.solve.
+            labels: (H, W), as for Diffusion.solve. At least one pixel must be drawn on, and one must be free.
+            count: The number of shutters.
             guide, strength: As for compute.diffusion.diffuse.
 
         Returns:
@@ -100,9 +101,13 @@ class EdgeDiffusion(Diffusion):
         return self._grids[0].textures["solution"]
 
     def _provide(self, cells: tuple[int, int]) -> None:
-        """Make the textures that Diffusion does not have, for a guide with this shape of cells.
+        """Make or reuse the textures that Diffusion does not have.
 
-        Those of conjugate gradients are cleared: passes skip tiles without free cells, but sums include them.
+        They are the links of pixels, the resistances of the guide's cells, and the vectors and sums of the conjugate
+        gradients. The vectors are cleared: passes skip tiles without free cells, but sums over all cells include them.
+
+        Args:
+            cells: The guide's (rows, columns).
         """
         grid, finest = self._grids[self._solved], self._grids[0]
         vectors = dict.fromkeys(("residual", "guess", "direction", "answer"), (*grid.size, grid.layers))
@@ -115,9 +120,9 @@ class EdgeDiffusion(Diffusion):
             finest.textures["links"] = self._device.texture(*finest.size, 1, "rgba32f")
 
     def _correct(self, index: int) -> None:
-        """Improve the solution of the grid with a number, which then corrects the next finer one.
+        """Improve the solution of grid number `index`, with which the caller then corrects the next finer grid.
 
-        Conjugate gradients improve it on their grid, and a cycle does on finer grids.
+        One grid is improved by conjugate gradients (see the module), any finer one by a V-cycle.
         """
         if index == self._solved:
             self._conjugate_gradients(self._grids[index], self._iterations)
@@ -148,12 +153,15 @@ class EdgeDiffusion(Diffusion):
             own["solution"], own["right"] = solution, right
 
     def _visit(self, index: int, iterations: int = 0, twice: int = 0) -> None:
-        """Improve a grid's solution by a cycle over it and the coarser grids, in all tiles.
+        """Improve a grid's solution by a multigrid cycle over it and all coarser grids, in all tiles with free cells.
+
+        Unlike Diffusion._cycle, it solves coarser grids for the correction of the whole solution, starting from 0.
 
         Args:
             index: The grid's number.
-            iterations: Of conjugate gradients, if they solve a coarser grid.
-            twice: How many of the next grids are visited twice.
+            iterations: How many iterations of conjugate gradients to do on the grid for which they are used, if that is
+                coarser than this one.
+            twice: How many of the next coarser grids are visited twice for each visit of the grid before.
         """
         grid, *coarser = self._grids[index : index + 2]
         if not coarser:
@@ -194,7 +202,9 @@ class EdgeDiffusion(Diffusion):
 
 
 def _is_enough(change: float, before: float) -> bool:
-    """Return whether cycles can end, assuming that changes go on shrinking at the same rate.
+    """Return whether cycles can end, since all later ones together would change no coefficient by ENOUGH or more.
+
+    This assumes that changes go on shrinking at the same rate.
 
     Args:
         change: The largest change of a coefficient in the last cycle.

@@ -76,15 +76,15 @@ def _light(window: Any, request: Request) -> dict[str, int | str]:
 
 
 def _from_sums(window: Sums, request: Request, values: np.ndarray, origin: int) -> tuple[Pass, Given]:
-    """Return the pass that composes a picture from running sums, and its arguments for Device.run.
+    """Return the pass compose_sums for a picture, and a part of its arguments for Device.run.
 
-    The caller adds those of a band of rows.
+    The caller adds the arguments that are common to all passes and those of each band of rows, such as the textures.
 
     Args:
         window: The running sums.
-        request: The picture.
+        request: The picture. Its shutters average their frames and are interpolated by displacement.
         values: The table of shutters, from composition_passes.table.
-        origin: The position of the window's first frame (core.model.windows).
+        origin: The position (frame number, also beyond the footage) of the window's first frame (core.model.windows).
     """
     back, rows = request.direction < 0, knots(values)
     groups, count = rows.shape[1] - 1, 2 * int(filled_rows(len(rows) // 2))
@@ -101,14 +101,16 @@ def _from_sums(window: Sums, request: Request, values: np.ndarray, origin: int) 
 def _from_frames(
     way: str, window: Any, request: Request, rows: int, origin: int, shortened: bool
 ) -> tuple[Pass, Given]:
-    """Return the pass that composes a picture in another way than from sums, and its arguments, like _from_sums.
+    """Return a pass other than compose_sums for a picture, and a part of its arguments for Device.run.
+
+    The window may still have running sums. The caller adds the table and the arguments that are common to all passes.
 
     Args:
-        way: From composition_passes.way_of.
+        way: The pass, from composition_passes.way_of.
         window: The frames or running sums.
         request: The picture.
-        rows: The number of pieces in the table of shutters.
-        origin: The position of the window's first frame (core.model.windows).
+        rows: The number of rows in the table of shutters, without row 0.
+        origin: The position (frame number, also beyond the footage) of the window's first frame (core.model.windows).
         shortened: As for way_of.
     """
     state, direction, shot = request.state, request.direction, window.shot
@@ -129,12 +131,16 @@ def _from_frames(
 
 
 def _threshold(combine: Combine, request: Request, shot: range) -> Given:
-    """Return the arguments of passes for a threshold of trails, empty without one.
+    """Return the arguments for Device.run that a threshold of trails (Combine.threshold) adds.
 
     Args:
-        combine: How frames are combined.
+        combine: How the shutters combine their frames.
         request: The picture.
-        shot: The source frames that may be shown.
+        shot: The source frames that may be exposed.
+
+    Returns:
+        {"threshold": (the luminance, half of the softness), "shown": the index of the shown frame in the window, −1 if
+        that frame is left out}. Empty if `combine` has no threshold.
     """
     if combine.threshold is None:
         return {}
@@ -145,10 +151,14 @@ def _threshold(combine: Combine, request: Request, shot: range) -> Given:
 
 
 def _in_window(state: FrameState, chosen: tuple[int, ...]) -> FrameState:
-    """Return the state of some shutters alone, for a window that was made for all of them.
+    """Return the state of some shutters alone (FrameState.of), for a window that was loaded for all shutters.
 
-    If any shutter follows something, the window has whole frames. Then these follow as well, with no motion if they
-    have none.
+    If any of all shutters follows a motion, the window stores frames in another form. Then the result has motions in
+    any case, which stand still if none of these shutters moves.
+
+    Args:
+        state: The state of all shutters.
+        chosen: The indices of the shutters.
     """
     part, following = state.of(chosen), state.following
     if following is None or part.following is not None:
@@ -163,9 +173,12 @@ def _bits(coefficients: Coefficients) -> int:
 
 
 def _curve(display: Display) -> np.ndarray:
-    """Return the parabolas (1, n, 4) float32 that approximate the display's curve, for shaders/display.glsl.
+    """Return the parabolas that approximate a display's curve from light to 8-bit levels, for shaders/display.glsl.
 
-    Each has three coefficients and the largest error, in levels.
+    Returns:
+        (1, n, 4) float32: a texel for each interval of light, 1/32 of an octave wide, from 2^-9 to 2. It has the
+        coefficients of t², t and 1, where t runs from −0.5 to 0.5 along the interval, and the largest error, all in
+        levels (0 to 255).
     """
     starts = np.arange(_FIRST, _FIRST + _PIECES, dtype=np.uint32) << np.uint32(_SHIFT)
     steps = np.linspace(0, (1 << _SHIFT) - 1, _PROBED).astype(np.uint32)
@@ -178,7 +191,7 @@ def _curve(display: Display) -> np.ndarray:
 
 
 class GPUCompositor:
-    """Composes pictures on a device (request.Compositor)."""
+    """Composes pictures on a GPU (request.Compositor). Pictures and coefficients are textures."""
 
     def __init__(self, device: Device) -> None:
         self.device, self.name, self.takes_planes = device, device.name, device.takes_planes
@@ -189,10 +202,14 @@ class GPUCompositor:
     def window(
         self, source: FrameSource, capacity: int, moved: bool = False, shutters: int = 4, summed: bool = True
     ) -> Window:
-        """Return a window for frames of a source: with running sums if the source allows them and the device has room.
+        """Make an empty window: storage on the device for the source frames that a picture exposes.
 
         Args:
             source, capacity, moved, shutters, summed: As for request.Compositor.window.
+
+        Returns:
+            With `moved`: PackedFrames for opaque 8-bit footage, else WholeFrames. Otherwise a window of running sums
+            (Sums or WeightedSums), if `summed` is True, the source allows sums and the device has room; else Frames.
         """
         size = self.device, source, capacity, shutters
         if moved:
@@ -213,10 +230,10 @@ class GPUCompositor:
         return self._textures.filled("labels", [values.astype(np.uint32)], "r32ui")
 
     def coefficients(self, handle: Texture, count: int) -> np.ndarray:
-        """Return how much of each shutter a pixel gets, (count, h, w) float32, from a texture array.
+        """Read back how much of each shutter a pixel gets, as an array (count, h, w) float32.
 
         Args:
-            handle: The texture array, with four shutters to a layer.
+            handle: The texture array, with four shutters per layer (Coefficients.handle).
             count: The number of shutters.
         """
         values = self.device.read(handle)
@@ -255,11 +272,11 @@ class GPUCompositor:
         return made
 
     def _picked(self, picture: Texture, places: np.ndarray) -> np.ndarray:
-        """Return the light (n, 3) of some pixels of a picture.
+        """Read the light of some pixels of a picture from the device, float32 (n, 3).
 
         Args:
-            picture: The picture.
-            places: The numbers of the pixels (n,), row by row.
+            picture: The picture, with the bottom row first.
+            places: (n,) pixels, as numbers row · width + column, where row 0 is the bottom row.
         """
         size = _COLUMNS, -(-len(places) // _COLUMNS)
         numbers = np.zeros((size[1], _COLUMNS), np.uint32)
@@ -271,25 +288,31 @@ class GPUCompositor:
         return self.device.read(picked)[0].reshape(-1, 4)[: len(places), :3]
 
     def _send(self, display: Display, noise: np.ndarray) -> tuple[dict[str, Texture], float]:
-        """Send a display's noise and curve to the device.
+        """Send to the device what the shader needs to convert pictures of one size to a display's levels.
+
+        Args:
+            display: The display.
+            noise: The display's noise for the picture's pixels, (H, W).
 
         Returns:
-            {name: texture} for both, and the slope of the display's linear part, which is not sRGB's 12.92 in
-            OpenColorIO.
+            {"grain": texture of the noise, "curve": texture of the parabolas (_curve)}.
+            The slope in levels per unit of light below 2^-9, where the display is linear. sRGB's is 255 · 12.92, but
+                OpenColorIO uses another one.
         """
         slope = 255 * float(display.transfer(np.array([2.0**_LOWEST], np.float32))[0]) / 2.0**_LOWEST
         grain = self._textures.filled("grain", [noise], "r32f")
         return {"grain": grain, "curve": self._textures.filled("curve", [_curve(display)])}, slope
 
     def draw(self, window: Handle, request: Request, coefficients: Coefficients) -> Texture:
-        """Return the picture on the device, premultiplied: a texture array with one layer.
+        """Expose a window's frames on the device. Return the picture, premultiplied: a texture array with one layer.
 
-        It is rgba32f, scene-linear, bottom row first; or with request.levels rgba8, display code values, top row first.
-        It belongs to the window, and is valid until the window's next picture of this format.
+        If request.levels is False, it is rgba32f, scene-linear, bottom row first. Otherwise it is rgba8 with 8-bit sRGB
+        values over black, top row first. The texture belongs to the window: the window's next picture of this format
+        overwrites it.
 
         Args:
-            window: The window, which has loaded all exposed frames.
-            request: The picture.
+            window: The window. All frames that the picture exposes must be loaded in it.
+            request: The picture. Its layers, strokes and mattes are not looked at.
             coefficients: How much of each shutter a pixel gets.
         """
         if len(request.state.groups) > 1:
@@ -332,7 +355,8 @@ class GPUCompositor:
     def _draw_ways(self, window: Handle, request: Request, coefficients: Coefficients) -> Texture:
         """Draw a picture whose shutters combine frames in several ways, such as average and lightest.
 
-        A picture is drawn for each way, and these are mixed. Arguments and result as for `draw`.
+        Draw a picture for each way, of the shutters that use it (FrameState.groups). Add up these pictures, weighted by
+        how much of those shutters each pixel gets. Arguments and result as for `draw`.
         """
         state, size = request.state, (window.source.width, window.source.height)
         groups = list(state.groups.values())
@@ -349,15 +373,19 @@ class GPUCompositor:
         return window.picture(levels=True) if request.levels else window.mixed()
 
     def _selected(self, handle: Texture, chosen: tuple[int, ...], count: int) -> tuple[Texture, Texture]:
-        """Return textures of how much of the chosen shutters each pixel gets, relative to each other and in sum.
+        """Return the coefficients of some shutters by themselves, and how much of these together each pixel gets.
 
-        The first has their coefficients scaled to a sum of 1, the second that sum before. Both are valid until the next
-        call.
+        Both textures are valid until the next call.
 
         Args:
-            handle: The coefficients of all shutters.
+            handle: The coefficients of all shutters, four per layer.
             chosen: The indices of the shutters.
             count: The number of all shutters.
+
+        Returns:
+            A texture array rgba32f with the coefficients of the chosen shutters, scaled to a sum of 1 in every pixel
+                (equal parts where they are all 0), in the order of `chosen`.
+            A texture r32f with the share of all coefficients that the chosen shutters have, 0 to 1.
         """
         groups, (width, height, _) = -(-len(chosen) // 4), handle.size
         numbers = np.full((groups, 4), -1, np.float32)
@@ -371,10 +399,11 @@ class GPUCompositor:
         return selected, share
 
     def _draw_on_host(self, window: Handle, request: Request, coefficients: Coefficients) -> Texture:
-        """Draw a median of frames with NumPy that the device cannot draw, and send it to the device.
+        """Draw a picture whose shutters take the median of frames with NumPy, and send it to the device.
 
-        Those of exposures that follow something need all frames in one pass. Others take too many loop iterations for
-        llvmpipe. Arguments and result as for `draw`.
+        Used if exposures follow a motion, as their median needs all frames in one pass, or if the pass would take too
+        many loop iterations for llvmpipe. All exposed frames are read from the footage again. Arguments and result as
+        for `draw`.
         """
         host, source, options = cpu.CPUCompositor(), window.source, request.state.options
         frames = host.window(source)
@@ -387,9 +416,10 @@ class GPUCompositor:
         return picture
 
     def _draw_moved(self, window: WholeFrames, request: Request, coefficients: Coefficients) -> Texture:
-        """Draw a picture whose shutters follow a motion.
+        """Draw a picture whose exposures follow a motion (FrameState.following).
 
-        For each texture array of frames, a pass adds to the last one's result. Arguments and result as for `draw`.
+        A window may have several texture arrays of frames, with a shader pass for each. A pass adds its frames to the
+        sum of the passes before; the last one finishes the picture. Arguments and result as for `draw`.
         """
         state, options, size = request.state, request.state.options, (window.source.width, window.source.height)
         (combine,), (first, last) = state.groups, state.open_span

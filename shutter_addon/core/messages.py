@@ -41,12 +41,13 @@ class MediaError(UserError):
 
 @contextmanager
 def translated(translate: Callable[[str], str]) -> Iterator[None]:
-    """Catch an EffectError in the `with` block, and raise it with its message in the user's language.
+    """Catch an EffectError of the `with` block, and raise it again with its message in the user's language.
 
-    An error without values for placeholders is raised as it is.
+    An error with empty `words` is raised unchanged, not translated.
 
     Args:
-        translate: Translates the template of an error, and its placeholder "fault".
+        translate: A function that translates a text. It is applied to the error's template and, if there is one, to the
+            value of the placeholder "fault", which is a sentence itself. Other values are inserted as they are.
     """
     try:
         yield

@@ -18,10 +18,13 @@ _lines: list[tuple[str, float]] = []  # with seconds since the start, replaced a
 
 
 def record(level: int = 1) -> None:
-    """Keep the line of code that makes an error or reports a message, if it is in the extension, for reports.
+    """Note the source line that makes an error or reports a message, so that *Copy Report* can list it.
+
+    Only lines of this extension are noted. If the line is in an `__init__` method (of an error's class), the line that
+    calls it is noted instead.
 
     Args:
-        level: How many calls up that line is: 1 for the caller.
+        level: How many calls above this function the line is: 1 for the line that calls `record`, 2 for its caller's.
     """
     frame = sys._getframe(level)
     while frame.f_back and frame.f_code.co_name == "__init__":  # of an error's class

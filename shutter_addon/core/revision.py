@@ -14,10 +14,11 @@ _MOST = 128  # cached values
 
 
 class Revision:
-    """A counter of changes to an edit, and a cache of values until the next change.
+    """A counter of the changes to an edit that Blender reports, and a cache of values that hold until the next change.
 
     Attributes:
-        number: The count. As long as it stays the same, nothing but the current frame can have changed.
+        number: How many changes were counted. While it stays the same, the edit's data are the same, as far as Blender
+            reports changes. A new current frame does not count as one, and neither do strokes or files on disk.
         replaced: How often Blender's data was replaced as a whole, by undo or by loading a file.
     """
 
@@ -32,17 +33,15 @@ class Revision:
         self._kept.clear()
 
     def until_change(self, what: str, key: Hashable, make: Callable[[], T]) -> T:
-        """Return the cached result of `make` for a name and key. `make` is called again only after a change.
+        """Return a value from the cache, or make it if it is not there. The next change of the edit empties the cache.
 
-        An exception of `make` is cached and raised, too.
-
-        This is for drawing, which happens often. Operators read anew, since they can come after a change that Blender
-        has not reported yet.
+        This is for drawing, which happens often. Operators should compute values anew, since they can run after a
+        change that Blender has not reported yet. Of many values, only the most recently used ones are kept.
 
         Args:
-            what: A name for the kind of value.
-            key: Everything else that the value depends on.
-            make: Makes the value.
+            what: A name for the kind of value, such as "outline".
+            key: Everything else that the value depends on. Together with `what`, it identifies the value in the cache.
+            make: Makes the value. An exception that it raises is cached, too, and raised each time.
         """
         value, error = self._kept.ask((self.number, what, key), lambda: _outcome(make), _MOST)
         if error is not None:

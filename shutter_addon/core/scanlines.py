@@ -17,14 +17,14 @@ def edges(polygons: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def crossings(start: np.ndarray, end: np.ndarray, lines: range) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return where the edges of polygons cross the middles of pixel rows (lines).
+    """Find where edges of polygons cross the middles of rows of pixels (lines).
 
     Args:
-        start, end: Of the edges, (n, 2).
-        lines: The numbers of the lines; line i has its middle at y = i + 0.5.
+        start, end: The starts and ends of the n edges, (n, 2) each: x, y in pixels.
+        lines: The numbers of the lines to look at; line i has its middle at y = i + 0.5.
 
     Returns:
-        For each crossing the edge's index, the line's number and x, (m,) each.
+        Three arrays (m,), with an entry for each crossing: the index of its edge, the number of its line, and its x.
     """
     lower, upper = np.where((start[:, 1] < end[:, 1])[:, None], (start, end), (end, start))
     first, last = (
@@ -39,15 +39,17 @@ def crossings(start: np.ndarray, end: np.ndarray, lines: range) -> tuple[np.ndar
 def fill(
     picture: np.ndarray, polygons: Sequence[np.ndarray], value: float, *, odd: bool = False, seam: float = 0.0
 ) -> bool:
-    """Set the pixels of a picture (h, w) whose middles are inside closed polygons. Return whether any pixel was set.
+    """Set the pixels of a picture whose middles are inside closed polygons, in place. Return whether any pixel was set.
 
     Args:
-        picture: The picture.
-        polygons: (n, 2) in pixels. What any of them winds around counts as inside (nonzero rule).
-        value: The new value.
-        odd: What an even number of them winds around is outside (even-odd rule).
-        seam: Pixels by which a filled span of a line is longer at its end, so that rounding leaves no gap to the next
-            one.
+        picture: The picture (h, w).
+        polygons: The corners of each polygon, (n, 2), x and y in pixels; the last corner is joined to the first.
+        value: The value to set.
+        odd: Choose the even-odd rule: a place is inside if an odd number of windings goes around it. By default, the
+            nonzero rule holds: a place is inside if the windings around it, of all polygons together, do not add up to
+            0. Those in opposite directions cancel each other.
+        seam: By how many pixels each filled span of a row is longer at its end, so that rounding leaves no gap between
+            polygons that touch.
     """
     height, width = picture.shape
     start, end = edges(polygons)
@@ -65,13 +67,14 @@ def fill(
 
 
 def ranges(first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return all integers of several ranges from `first` to `last` − 1 in one array.
+    """Put the integers of several ranges into one array, one range after the other.
 
     Args:
-        first, last: Of the ranges, (r,).
+        first: The first integer of each range, (r,).
+        last: The integer after the last one of each range, (r,). A range is empty if this is not above `first`.
 
     Returns:
-        The index of its range for each integer, and the integers, (n,) each.
+        Two arrays (n,), with an entry for each integer: the index of its range, and the integer.
     """
     counts = np.maximum(last - first, 0)
     index = np.repeat(np.arange(len(counts)), counts)

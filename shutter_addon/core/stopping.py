@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 
 class StoppedError(Exception):
-    """The work was cancelled, or its time slice is over."""
+    """Raised by `check` where work is to end: it was cancelled, or the time of its slice is over."""
 
 
 def never() -> bool:
@@ -24,15 +24,17 @@ def never() -> bool:
 
 @dataclass
 class Slice:
-    """A time slice of work that would freeze the window if it ran in one go. The next slice continues it.
+    """A limit of time for a part of long work, so that the window does not freeze. The next slice continues.
 
-    Call the object to find out whether its time is over.
+    Call the object to find out whether the time is over. It can be passed to `once`, so that `check` ends the work
+    then.
 
     Attributes:
-        soon: When it ends (by time.monotonic) if it has kept a result for the next slice.
-        end: When it ends in any case.
-        waits: Whether work may wait for another thread's results.
-        has_kept: Whether it has kept a result.
+        soon: When the slice ends, as a time of time.monotonic, if a result was cached in it (`has_kept`), from which
+            the next slice can go on.
+        end: When it ends otherwise, on the same clock; not before `soon`.
+        waits: Whether the work in it may wait for results of another thread (see `waits` in this module).
+        has_kept: Whether a result was cached during this slice. The function `kept` sets it.
     """
 
     soon: float
@@ -50,15 +52,15 @@ _LONGER, _AGAIN = 1.02, 1.5
 
 @dataclass
 class Slices:
-    """Time slices in which one result is made piece by piece, so that the window does not freeze.
+    """The sequence of time slices (Slice) in which a result is made piece by piece, so that no window freezes.
 
-    Each is longer than the last one, so that all work ends.
+    The limits grow from slice to slice, so that even a step that does not fit into the first slices is done at last.
 
     Attributes:
-        key: Which result is being made.
-        last: The last slice; None: nothing is being made.
-        soon: How many seconds the last slice lasts once it has kept something for the next one.
-        seconds: How many seconds it lasts at most.
+        key: Identifies the result that is being made.
+        last: The newest slice. None: no result is being made.
+        soon: The length of the newest slice, in seconds, if a result is cached in it.
+        seconds: The length of the newest slice, in seconds, if nothing is cached in it.
     """
 
     key: Hashable = None
@@ -67,13 +69,17 @@ class Slices:
     seconds: float = 0.0
 
     def next(self, key: Hashable, first: float, least: float, *, waits: bool = True) -> Slice:
-        """Begin the next time slice of work on a result, and return it. Slices grow, so that all work ends.
+        """Begin and return the next time slice for work on a result.
+
+        Each further slice gets 2 % more time to end in once it has cached something (`soon`). If the last slice cached
+        nothing, its work was lost and starts over, so the next one gets half as much time again (`seconds`).
 
         Args:
-            key: Which result is made. A new one begins with a slice of `first` seconds.
+            key: Identifies the result. If it differs from the last slice's, or `end` was called, the sequence begins
+                anew.
             first: The length of the first slice in seconds.
-            least: The least seconds of a later slice.
-            waits: Whether work may wait for another thread's results.
+            least: The smallest length of a later slice in seconds.
+            waits: Whether the work may wait for results of another thread.
         """
         if self.last is None or self.key != key:
             self.soon = self.seconds = first

@@ -44,9 +44,9 @@ def fulfil(future: Future[T], function: Callable[[], T]) -> bool:
 
 
 def daemon(function: Callable[..., object], *arguments: object) -> threading.Thread:
-    """Call a function on a new thread, which does not keep Python from exiting, and return the thread.
+    """Call a function on a new daemon thread, which Python does not wait for when it exits, and return the thread.
 
-    An exception is printed, and noted for reports (recent_errors).
+    An exception of the function is printed, and noted for *Copy Report* (recent_errors).
     """
     thread = threading.Thread(target=_noting, args=(function, *arguments), name=_NAME, daemon=True)
     thread.start()
@@ -63,15 +63,15 @@ def _noting(function: Callable[..., object], *arguments: object) -> None:
 
 
 def beside(steps: Iterable[T], patience: float | None) -> Generator[T | None, None, None]:
-    """Iterate over `steps` on another thread, and yield their results here as they come.
+    """Iterate over `steps` on another thread, and yield the items here as they come.
 
-    The thread runs ahead. Closing the generator cancels it at its next `stopping.check` and waits for it. An exception
-    of `steps` is raised here.
+    The thread does not wait for the items to be used. If the generator is closed, it stops the thread after the current
+    item, or at its next `stopping.check`, and waits until the thread has ended. An exception of `steps` is raised here.
 
     Args:
         steps: What to iterate over.
-        patience: Seconds without a result after which None is yielded, so that the caller can do something else. None:
-            never.
+        patience: After this many seconds without an item, None is yielded, so that the caller can do something else and
+            ask again. None: wait for each item as long as it takes.
     """
     ended, results = threading.Event(), queue.SimpleQueue[tuple[T | None, Exception | None, bool]]()
     thread = daemon(_find, steps, ended, results)

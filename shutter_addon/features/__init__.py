@@ -55,10 +55,15 @@ def call(name: str, *arguments: Any) -> None:
 
 
 def needed(name: str) -> Any:
-    """Return the attribute `name` of the feature module that has it.
+    """Return an attribute, such as a class or function, of the first module of any feature that has it.
+
+    The extension uses this to reach a feature that may have been removed.
+
+    Args:
+        name: The attribute's name.
 
     Raises:
-        EffectError: No module has it, because the feature was removed.
+        EffectError: No module has it, because its feature was removed.
     """
     for found in each(name):
         return found

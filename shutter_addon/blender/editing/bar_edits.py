@@ -149,9 +149,14 @@ def shown(effect: PropertyGroup, index: int) -> tuple[np.ndarray, list[str]]:
 
 
 def key_state(effect: PropertyGroup, index: int) -> list[str]:
-    """Return the animation state of each of a shutter's bars at the current frame, as Blender colors fields by it.
+    """Return the animation state of each of a shutter's bars at the current frame, which the bar editor shows in color.
 
-    It is "" (not animated), "animated", "keyed" (has a keyframe here) or "changed" (differs from its F-curve now).
+    Args:
+        index: Index of the shutter.
+
+    Returns:
+        A word for each bar: "" (it has no F-curve), "changed" (its stored weight differs from its F-curve, because it
+        was edited and not keyed yet), "keyed" (it has a keyframe at this frame) or "animated" (it has none here).
     """
     scene = effect.id_data
     curves = fcurves.Curves(scene)
@@ -169,15 +174,16 @@ def _state(curve: FCurve | None, value: float, scene: Scene) -> str:
 
 
 def bars_now(effect: PropertyGroup, index: int) -> np.ndarray:
-    """Return how much each frame counts for a shutter (its bars, (L,)) in the picture at the current frame.
+    """Return a shutter's bars (L,) at the current frame: how much each frame of the window counts in the picture.
 
-    Between keyframes, bars are interpolated. Bars that were changed and not keyed yet are returned as stored.
+    Bars with keyframes are interpolated. But if any bar was changed and is not keyed yet, all bars are returned as they
+    are stored, without a check.
 
     Args:
-        index: Of the shutter.
+        index: Index of the shutter.
 
     Raises:
-        EffectError: A bar is out of range, or they are not as many as the window is long.
+        EffectError: A bar is out of range, or the number of bars is not the window's length.
     """
     return _read(effect, index)[0]
 

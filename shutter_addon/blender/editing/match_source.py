@@ -31,13 +31,15 @@ def strip_and_source(effect: PropertyGroup) -> list[Strip]:
 
 
 class Shown(NamedTuple):
-    """What panels show about an effect's source.
+    """What panels show about the source strip of an effect, and how the effect strip differs from it.
 
     Attributes:
-        source: The source strip's name.
-        differences: Labels of what `match` would change.
-        lacks_modifiers: Whether the source has unmuted modifiers of a type that the effect strip lacks.
-        has_effects: Whether strips such as Glow or Speed Control use the source.
+        source: Name of the source strip.
+        differences: English labels of what `match` would change: keys of add_effect.LOOK, such as "crop", and "range".
+        lacks_modifiers: Whether the source has more unmuted modifiers of some type than the effect strip has of that
+            type. An effect reads the source's file, so modifiers of the source do not show in it.
+        has_effects: Whether strips such as Glow or Speed Control have the source as input. Their result does not show
+            in the effect either.
     """
 
     source: str
@@ -66,10 +68,13 @@ def _compare(effect: PropertyGroup) -> Shown | None:
 
 
 def match(effect: PropertyGroup) -> Strip | None:
-    """Give the effect strip the look (transform, crop, flip, color), its keyframes and the range of its source.
+    """Copy the look (transform, crop, flip, color) with its keyframes, and the range, from the source to its effect.
+
+    Strokes stay where they are on the picture.
 
     Returns:
-        The neighboring strip that keeps the range smaller than the source's; None: no strip does.
+        A neighbor in the same channel because of which the effect strip does not get the whole range; None: none is in
+        the way.
     """
     scene, (strip, source) = effect.id_data, strip_and_source(effect)
     with scribbles_kept(effect, strip):
@@ -82,9 +87,12 @@ def match(effect: PropertyGroup) -> Strip | None:
 
 
 def _looks(strip: Strip) -> dict[str, str]:
-    """Return the values and keyframes of a strip's look as texts, by the names in add_effect.LOOK, to compare strips.
+    """Describe a strip's look in texts: strips look alike if their texts are equal.
 
-    Texts are compared and not numbers, because NaN never equals NaN.
+    Numbers would not do, because NaN never equals NaN.
+
+    Returns:
+        For each key of add_effect.LOOK, such as "crop": the values and unmuted F-curves of its properties, as a text.
     """
     path = f"{strip.path_from_id()}."
     curves = [curve for curve in fcurves.curves_under(strip.id_data, path) if not curve.mute]
@@ -109,10 +117,14 @@ def _keyed(curves: list[FCurve], path: str) -> list:
 
 
 def _goal(effect: PropertyGroup, strip: Strip, source: Strip) -> tuple[int, int, Strip | None]:
-    """Return the left and right handle that `match` would give an effect strip, and the strip that limits them or None.
+    """Return the left and right handle that `match` would give an effect strip, and a strip that is in the way.
 
-    The handles are those of the source, or of all parts of the cut source that lie below the strip. Where another
-    effect strip uses the same source beyond an edge, that edge stays. Without any room, both stay.
+    The range is that of the source. If the source was cut, it is that of all its parts which share frames with the
+    strip. A handle stays where it is if another effect strip with the same source reaches farther on that side.
+    Neighbors in the same channel limit the range. If they leave no frame, both handles stay.
+
+    Returns:
+        Left handle; right handle; the neighbor before or, if that is not in the way, after the strip; None: none is.
     """
     parts = (s for s in effect.id_data.sequence_editor.strips_all if s.virtual_shutter_source == effect.source)
     parts = (s for s in parts if s.type == source.type and strips.origin(s) == strips.origin(source))
@@ -133,14 +145,16 @@ def _goal(effect: PropertyGroup, strip: Strip, source: Strip) -> tuple[int, int,
 
 
 def _slip(scene: Scene, strip: Strip, source: Strip, left: int, right: int) -> None:
-    """Slip the content and the keyframes of an effect strip to where its source's content begins, if necessary.
+    """Move the content of an effect strip, within its handles, to where its source's content begins, if necessary.
 
-    It is necessary if the source moved as a whole, or begins before the effect's content. An effect strip would show
-    only its first frame before its content begins.
+    It is necessary if the source was moved as a whole: content and handles by the same number of frames. It also is if
+    the strip would otherwise begin before its content, and repeat the content's first frame until there. The effect's
+    keyframes and drawings follow at the next update (reconcile).
 
     Args:
-        left: Left handle that the strip will get.
-        right: Right handle that the strip will get.
+        scene: The scene with both strips.
+        left: Left handle that the effect strip will get.
+        right: Right handle that the effect strip will get.
     """
     frames = int(source.content_start - strip.content_start)
     moved = frames == left - strip.left_handle == right - strip.right_handle
@@ -160,7 +174,12 @@ def scribbles_kept(effect: PropertyGroup, strip: Strip) -> Iterator[None]:
 def places(effect: PropertyGroup, strip: Strip) -> list[np.ndarray | None]:
     """Return, for each drawing of an effect, the matrix (3, 3) from the sequencer's image to the picture at its frame.
 
-    It is None where the picture is too small, or where its transform is not finite.
+    `put_back` compares these from before and after a change. Points of the image are pixels from its center, y up;
+    those of the picture are fractions 0 to 1.
+
+    Returns:
+        A matrix for each drawing, in the order of _drawings. None: at its frame, the picture has a side of fewer than 4
+        pixels, or the strip's transform is not finite.
     """
     frames = [drawing.frame_number for drawing in _drawings(effect)]
     placement = sampled.Sampling.of(effect.id_data, effect, strip, frames).placement
@@ -169,10 +188,12 @@ def places(effect: PropertyGroup, strip: Strip) -> list[np.ndarray | None]:
 
 
 def put_back(effect: PropertyGroup, strip: Strip, before: list[np.ndarray | None]) -> None:
-    """Move an effect's strokes so that they are where they were on the picture, after the picture was moved.
+    """Move an effect's strokes along with its picture, so that they stay in place on it.
+
+    A drawing whose place on the picture is unknown (None), before the change or now, is left alone.
 
     Args:
-        before: What `places` returned before the picture was moved.
+        before: What `places` returned before the picture was moved or resized.
     """
     for drawing, old, new in zip(_drawings(effect), before, places(effect, strip), strict=True):
         if old is not None and new is not None and not np.array_equal(old, new):

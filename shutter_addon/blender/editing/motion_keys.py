@@ -41,11 +41,15 @@ _STEADY = 0.25  # pixels by which keyframes of the camera may be off, since it m
 
 @dataclass(frozen=True)
 class MotionKeys:
-    """Reads and writes the keyframes of a region's or the camera's motion. Frames are timeline frames.
+    """Reads and writes the keyframes of the motion of a region or the camera. Frames are timeline frames.
+
+    Generated keyframes were made by tracking and not changed since. All others are the user's.
 
     Attributes:
-        index: Of the region; None: the camera.
-        motion: Which properties tracking keys, an item of choices.MOTIONS: location, with rotation, or also with scale.
+        effect: The effect that has the region or camera.
+        index: Index of the region; None: the camera.
+        motion: What tracking keys, an item of choices.MOTIONS: "LOCATION"; "ROTATION": location and rotation; "SCALE":
+            location, rotation and scale.
     """
 
     effect: bpy.types.PropertyGroup
@@ -64,10 +68,10 @@ class MotionKeys:
         return curve is not None and bool(_read(curve)[1].any())
 
     def reach(self, frame: int) -> bool:
-        """Tell whether the motion is known at a frame.
+        """Tell whether the keyframes say how the region or camera moves at a frame.
 
-        It is if it has several keyframes, and tracking, if it was used, found a position at the frame. A single
-        keyframe does not count, because nothing moves.
+        An F-curve of the motion must have several keyframes: with one, nothing moves. If tracking was used, it must
+        also have stored a confidence for the frame.
         """
         tracked = self.confidence()[0]
         are_several = any(len(curve.keyframe_points) > 1 for curve in self._curves(_COUNTS[self.motion]))
@@ -80,10 +84,11 @@ class MotionKeys:
         return list(dict.fromkeys(names))
 
     def hold(self, first: int, last: int) -> None:
-        """Insert keyframes right before and after a range of frames, with the motion that tracking had found there.
+        """Insert generated keyframes right before and after a range, so that changes within it move nothing outside.
 
-        So changes within the range do not move what is outside. A frame that was not tracked or has a keyframe gets
-        none. Values are as tracking found them, even if the user has changed the keyframes at the range's ends since.
+        They have the motion that tracking found there, even if the user has since inserted keyframes at the range's
+        first or last frame, which bend the F-curves. Do nothing beside the range where a frame was not tracked or has a
+        keyframe.
 
         Args:
             first: First frame of the range, which will change.
@@ -96,9 +101,13 @@ class MotionKeys:
                 _insert(curve, frame, value)
 
     def begin(self, frame: int) -> None:
-        """Insert a keyframe of the user's at the scene's current frame, from which tracking will start.
+        """Insert keyframes of the user's at the scene's current frame, from which tracking will start.
 
-        The motion that tracking had found right before and after the frame stays (`hold`).
+        First insert generated keyframes at the frames right before and after it, to keep the motion tracked there
+        (`hold`).
+
+        Args:
+            frame: The scene's current frame.
 
         Raises:
             EffectError: As in check_curves.
@@ -107,14 +116,14 @@ class MotionKeys:
         insert(self.effect, self.index, self.channels(), begins=True)
 
     def write(self, placements: Mapping[int, Placement], confidence: Mapping[int, float]) -> None:
-        """Replace the generated keyframes at the frames that tracking has just tracked, and store its confidence.
+        """Store a result of tracking: replace the generated keyframes at the tracked frames, and store the confidence.
 
-        Frames tracked earlier and the user's keyframes stay. Frames in between that were never tracked get a
-        confidence of 0.
+        The user's keyframes stay, and so does the motion at frames that were not tracked this time (`hold`). A frame
+        between the first and last one of `confidence` that was never tracked gets a confidence of 0.
 
         Args:
-            placements: Location, rotation and scale for each new keyframe, at some of the tracked frames.
-            confidence: How sure tracking is, 0 to 1, by frame, for all frames just tracked.
+            placements: Location, rotation and scale for each new keyframe, by frame. Only some tracked frames need one.
+            confidence: How sure tracking is, 0 to 1, by frame, for every frame that was tracked this time.
         """
         for first, last in frame_ranges.runs(confidence):
             self.hold(first, last)
@@ -129,13 +138,16 @@ class MotionKeys:
         _replace(self._curve("confidence", new=True), every, every)
 
     def needed(self, shape: Region | Camera, start: int, placements: Placements, kept: Collection[int]) -> list[int]:
-        """Return the few frames whose keyframes reproduce a tracked motion within a pixel (camera: _STEADY pixels).
+        """Return the frames, as few as possible, whose keyframes reproduce a tracked motion by interpolation.
+
+        The region may be off by up to 1 pixel of the picture, the camera by up to _STEADY pixels. The first and the
+        last frame always need a keyframe.
 
         Args:
-            shape: The region or camera as plain data; the motion is compared at its strokes, or at the picture's
-                corners.
-            start: Timeline frame whose drawing of the region is compared.
-            placements: The tracked motion, by timeline frame.
+            shape: The region or camera as plain data. The error is measured at the points of the region's strokes or,
+                for the camera, at the picture's corners.
+            start: Timeline frame at which the region's strokes are taken.
+            placements: The tracked motion: the placement at each timeline frame.
             kept: Frames to return in any case.
         """
         size = annotations.picture_size(self.effect)
@@ -150,13 +162,15 @@ class MotionKeys:
         return points[:, 0], points[:, 1] / 100
 
     def fade(self, name: str, keys: Iterable[presence.Key]) -> None:
-        """Replace the generated keyframes that fade the opacity or influence out where the track ends.
+        """Replace the generated keyframes that fade a region's opacity or the camera's influence where its track ends.
 
-        The user's keyframes stay. If no keyframes are left, the property gets the user's value back.
+        The user's keyframes stay. If no keyframes are left, remove the F-curve and restore the value from before
+        fading.
 
         Args:
-            name: Property from 0 to 1, one of ENDS.
-            keys: The new keyframes; values are shares of the user's value.
+            name: "opacity" (region) or "influence" (camera), as in ENDS.
+            keys: The new keyframes. Their values, 0 to 1, are multiplied by the user's: at that frame if the user has
+                keyframes, otherwise the property's value before fading.
         """
         curve = self._curve(name, new=True)
         moving, path = selection.moving(self.effect, self.index), curve.data_path
@@ -193,11 +207,13 @@ class MotionKeys:
 def check_curves(effect: PropertyGroup, index: int | None) -> None:
     """Check that F-curves of a region's or the camera's motion can be changed.
 
+    These are the F-curves of location, rotation, scale, tracking's confidence, and opacity (camera: influence).
+
     Args:
-        index: Of the region; None: the camera.
+        index: Index of the region; None: the camera.
 
     Raises:
-        EffectError: One is locked or muted.
+        EffectError: One of the F-curves or of their groups is locked or muted.
     """
     moving = selection.moving(effect, index)
     for name in (*CHANNELS, "confidence", ENDS[index is None]):
@@ -210,15 +226,16 @@ def check_curves(effect: PropertyGroup, index: int | None) -> None:
 
 
 def insert(effect: PropertyGroup, index: int | None, names: Sequence[str] = CHANNELS, *, begins: bool = False) -> None:
-    """Insert keyframes that count as the user's for the motion of a region or the camera, at the scene's current frame.
+    """Insert keyframes of the user's for the motion of a region or the camera, at the scene's current frame.
 
-    If the frame was tracked, its confidence becomes full.
+    If tracking has stored a confidence for this frame, it becomes full (1).
 
     Args:
-        index: Of the region; None: the camera.
-        names: Properties to key.
-        begins: Tracking will start here, so the keyframes lie on a frame that can be tracked. Otherwise, on a stretched
-            timeline, they lie where Blender's own would, and store the values that tracking had found.
+        index: Index of the region; None: the camera.
+        names: Properties to key, some of CHANNELS.
+        begins: True: tracking will start at these keyframes, so they lie on a frame that can be tracked. False: they
+            also store the values that tracking had found there, for a later `hold`. On a timeline with *Time
+            Stretching*, they then lie where Blender's own keyframes would.
 
     Raises:
         EffectError: As in check_curves.
@@ -251,9 +268,12 @@ def _keys_at(curve: fcurves.Timed, frame: float) -> list:
 
 
 def _tracked_value(curve: fcurves.Timed, frame: float) -> float:
-    """Return the value that tracking had found at a frame, to be stored in a user's keyframe that is inserted there.
+    """Return the value that tracking found at a frame, which a user's keyframe stores when it is inserted there.
 
-    It is NOTHING_KEPT if none is known.
+    If a user's keyframe is there already, it is what that stores; otherwise, it is the F-curve's value.
+
+    Returns:
+        NOTHING_KEPT if that keyframe stores nothing, or if the F-curve has no keyframes.
     """
     for key in _keys_at(curve, frame):
         if key.type != MADE:
@@ -262,12 +282,16 @@ def _tracked_value(curve: fcurves.Timed, frame: float) -> float:
 
 
 def _as_tracked(curve: fcurves.Timed, edited: tuple[int, int], frames: list[float]) -> dict[float, float]:
-    """Return, by frame, the values that tracking had found at some frames without a keyframe, interpolated linearly.
+    """Return the values that tracking found at frames without a keyframe, interpolated linearly between keyframes.
 
     Args:
-        edited: Two frames whose keyframes may be the user's. The values of tracking that these store are used,
-            and removed from the keyframes.
-        frames: The frames to return values for; those with a keyframe are left out.
+        curve: F-curve of one component of the motion.
+        edited: Two frames that may have keyframes of the user's. Where such a keyframe stores a value that tracking
+            found, that value is interpolated instead of the user's, and the keyframe stores it no longer.
+        frames: The frames to return values for.
+
+    Returns:
+        Values by frame. Frames that have a keyframe are left out; {} if the F-curve has no keyframes.
     """
     points = curve.points()
     for i in np.flatnonzero(np.isin(points[:, 0], edited)).tolist():
@@ -287,11 +311,12 @@ def _values(placement: Placement) -> tuple[float, ...]:
 def _replace(curve: fcurves.Timed, values: dict[int, float], tracked: Iterable[int]) -> None:
     """Replace the generated keyframes of an F-curve at the tracked frames.
 
-    The user's keyframes stay, and become linear where generated ones follow.
+    The user's keyframes stay, and no new ones are inserted at their frames. If there are new ones, the user's at
+    tracked frames before the last become linear, as new ones may follow.
 
     Args:
-        values: The new keyframes' values by frame.
-        tracked: All frames that were tracked.
+        values: The new keyframes' values by frame; {}: only remove the old ones.
+        tracked: All frames that were tracked. Keyframes at other frames stay.
     """
     points, (frames, made) = curve.keyframe_points, _read(curve)
     within = np.isin(frames, list(tracked))

@@ -35,12 +35,13 @@ _OF_EDIT = "fps", "fps_base", "use_multiview"
 
 
 def update(updated: Scene | None = None) -> None:
-    """Make effects fit the strips after a change of the edit, and drop cached frames of changed effects.
+    """Adapt effects to their strips after a change of the edit, and drop cached frames of changed effects.
 
-    Do nothing while a render job runs. Data of a newer version of the extension is not changed.
+    For example, a copied strip gets an effect of its own, and a moved one takes its keyframes along (see this module).
+    Do nothing while a render job runs. If a newer version of the extension saved the file, only drop frames.
 
     Args:
-        updated: Scene whose depsgraph is being updated, which must not be removed now.
+        updated: Scene whose depsgraph is being updated, which must not be removed now; None: no scene is.
     """
     if bpy.app.is_job_running("RENDER"):
         return
@@ -53,13 +54,13 @@ def update(updated: Scene | None = None) -> None:
 
 
 def tidy(updated: Scene | None = None) -> list[strips.Shown]:
-    """Make effects fit the strips, as `update` does, but read no footage (follow_sources) and drop no frames.
+    """Adapt effects to their strips, as `update` does, but read no footage (follow_sources) and drop no cached frames.
 
     Args:
-        updated: Scene whose depsgraph is being updated, which must not be removed now.
+        updated: Scene whose depsgraph is being updated, which must not be removed now; None: no scene is.
 
     Returns:
-        The effects that strips show afterwards.
+        The effects that strips show afterwards, each with its strip and source.
     """
     scenes = _oldest_first(strips.local_scenes())
     _find_scenes(scenes)
@@ -93,10 +94,10 @@ def forget() -> None:
 
 
 def find_lost() -> None:
-    """Restore pointers to effect scenes and actions after undo.
+    """Restore the pointers to effect scenes and actions that undo has broken.
 
-    Blender reads a changed scene into new memory, and pointers in there then point to the scene itself. The memory may
-    be that of data which the undone step removed: of effect scenes, and of actions (_renew_action).
+    Undo reads a changed scene into new memory. This may be where data lay that the undone step removed: an effect
+    scene, or an action (_renew_action). Pointers to that data then point to the scene itself instead, or are empty.
     """
     scenes = strips.local_scenes()
     for scene in scenes:
@@ -105,9 +106,9 @@ def find_lost() -> None:
 
 
 def _find_action(scene: Scene) -> None:
-    """Restore a scene's lost pointer to its action: find the unused action that has the slot that the scene used.
+    """Restore a scene's lost pointer to its action: to an action that nothing uses and that has the scene's slot.
 
-    A scene whose action the user removed has no slot handle, and is left alone.
+    The scene stores the handle (a number) of its slot. It stores none if the user removed the action; then do nothing.
     """
     animation = scene.animation_data
     if animation is None or animation.action is not None or not animation.action_slot_handle:
@@ -159,9 +160,10 @@ def _bring_back(scenes: list[Scene]) -> None:
 
 
 def _oldest_first(scenes: list[Scene]) -> list[Scene]:
-    """Return the scenes sorted by age, so that copies come after their original, which then stays unchanged.
+    """Return the scenes sorted by age (session_uid), so that a copied scene comes after its original.
 
-    Undo assumes that a scene which the last step did not change is unchanged.
+    Where both share something, callers leave it to the first and change the copy. The original must stay unchanged,
+    because undo assumes that a scene which the user's last step did not change is unchanged.
     """
     return sorted(scenes, key=lambda scene: scene.session_uid)
 
@@ -194,10 +196,12 @@ def _adopt(scenes: list[Scene]) -> None:
 
 
 def _place(strip: Strip) -> tuple[bool, int, int]:
-    """Return a sort key for effect strips that show the same effect. The first in this order keeps the effect.
+    """Return a sort key for strips that show the same effect. The first strip keeps it, and the others get copies.
 
-    The first is the strip whose content begins where the effect's does, else the first on the timeline. The others get
-    copies.
+    First is the strip whose content begins where the effect does, otherwise the first on the timeline.
+
+    Returns:
+        Whether the content begins elsewhere or the scene lacks the effect; the left handle; the channel.
     """
     effect = strips.effect_of(strip.id_data, strip.scene)
     return effect is None or strips.origin(strip) != effect.start, strip.left_handle, strip.channel
@@ -243,10 +247,11 @@ def _remove_effects(scene: Scene) -> None:
 
 
 def _renew_action(scene: Scene) -> None:
-    """Replace a scene's action by a copy, before a handler changes it.
+    """Replace a scene's action by a copy before a handler of ours changes its F-curves, so that undo restores them.
 
-    Handlers run after the undo push of the user's step. Undo keeps data that is equal in both steps in its current
-    state, with the handler's changes. The copy is in neither step, so undo restores the action.
+    Handlers run after Blender has stored the user's step for undo. If an action is equal before and after that step,
+    undo leaves it as it is now, with the handler's changes. A copy is in neither state, so undo has to restore the
+    action. Do nothing if there is no action, or a linked one.
     """
     action = scene.animation_data and scene.animation_data.action
     if not action or action.library is not None:
@@ -302,9 +307,13 @@ def _follow_strips(shown: list[strips.Shown]) -> None:
 
 
 def _move_drawings(effect: PropertyGroup, start: float) -> None:
-    """Move drawings of an effect in time, from the start frame that their annotation stores, to `start`.
+    """Move an effect's drawings in time by as many frames as the start of its strip's content has moved.
 
-    The effect's own start would not do: undo may restore it, but leave the annotation as a handler has moved it.
+    The annotation stores the start that its drawings fit. The effect's own start counts only if the annotation has no
+    valid one: undo may restore the effect, but leave the annotation as a handler has moved it.
+
+    Args:
+        start: Timeline frame where the content of the effect's strip now begins (strips.origin).
     """
     annotation = effect.scene.annotation
     if annotation is None or annotation.library is not None:
@@ -320,9 +329,10 @@ def _move_drawings(effect: PropertyGroup, start: float) -> None:
 
 
 def _part_sources(shown: list[strips.Shown]) -> None:
-    """Give source strips that share an identity, as copies and cut parts do, identities of their own.
+    """Give source strips new identities where effects use different strips with the same identity.
 
-    This is done where effects use different strips with the same identity.
+    Copies and cut parts of a strip share its identity. The first strip that is found keeps it. Effects of the others
+    get the new identity, too.
     """
     first: dict[tuple[Scene, str], Strip] = {}
     for effect, strip, source in shown:
@@ -339,19 +349,20 @@ def _unmute_sources(scenes: list[Scene], shown: list[strips.Shown]) -> None:
 
 
 def _is_baked_over(source: Strip) -> bool:
-    """Tell whether a strip with a baked (rendered) effect lies above a source that it is connected with.
+    """Tell whether a baked (rendered) effect covers a source: a strip above that is connected and overlaps in time.
 
-    The source then stays muted, as it would show through transparent parts of the baked strip.
+    Such a source stays muted, because it would show through transparent parts of the baked strip.
     """
     baked = (s for s in source.connections if s.type in strips.SOURCES and s.channel > source.channel)
     return any(s.virtual_shutter_bake.identity and strips.overlap(s, source) for s in baked)
 
 
 def _follow_names(shown: list[strips.Shown]) -> None:
-    """Enter the new name of a renamed annotation layer in the regions that use it.
+    """Enter the new name of a renamed annotation layer in the regions that use it, then store the layers' names.
 
-    An effect stores the names that its regions know, so that undo restores both together, with or without the
-    annotation.
+    An effect stores the names of its annotation's layers as of the last call. A layer counts as renamed if exactly one
+    name differs and none was added or removed. The names are stored in the effect, and not in the annotation, so that
+    undo restores them together with the regions.
     """
     for effect, _strip, _source in shown:
         annotation = effect.scene.annotation
@@ -401,7 +412,11 @@ def _remove_left() -> None:
 
 
 def follow_sources(shown: list[strips.Shown]) -> None:
-    """Update effect scenes: frame rate and views of the edit, size of the source, and how Blender blends the strips.
+    """Update effect scenes: frame rate and stereo views from the edit, size and color mixing from the source's footage.
+
+    If the size changes, strokes stay in place on the picture. Color mixing is how Blender blends pixels where it scales
+    or turns an effect strip: as display values or as light, whichever it does for the source. Footage that cannot be
+    read leaves size and color mixing as they are.
 
     Args:
         shown: The effects with their strips and sources.
@@ -440,8 +455,8 @@ def _header(spec: source_media.SourceSpec) -> tuple[tuple[int, int], bool] | Non
     """Open footage once, and return what effect scenes need to know of it; None: it cannot be read.
 
     Returns:
-        Width and height in pixels, limited to what a scene can have, and whether Blender blends its display values
-        instead of light.
+        (width, height) in pixels, limited to what a Blender scene can have; and whether Blender, where it scales or
+        turns the footage, blends display values (movies, 8-bit pictures) instead of light.
     """
     with suppress(MediaError):
         medium = open_source(spec.path, files=spec.files, **spec.options | {"colorspace": None})

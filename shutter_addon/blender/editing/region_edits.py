@@ -49,13 +49,15 @@ def add_region(
 
 
 def first_drawn(effect: PropertyGroup, shutter: PropertyGroup, kind: str) -> PropertyGroup:
-    """Return a region for new strokes: the active one if it is empty and uses this shutter, otherwise a new one.
+    """Return a region for new strokes: the active one if it is empty and uses the shutter, otherwise a new one.
 
-    An effect's first region, if its shutter is sharp (one open frame), usually marks a subject, not a spot. It turns
-    *Follow Edges* on unless the user has set that, and becomes a subject if one is found under its first stroke.
+    An effect's first scribble usually marks a subject, if its shutter is sharp (at most one open frame). Then turn
+    *Follow Edges* on, and let the region become a subject if one is found under its first stroke. Do neither if the
+    user has set *Follow Edges*.
 
     Args:
-        kind: An item of choices.KINDS that the region gets.
+        shutter: The shutter that exposes the region.
+        kind: An item of choices.KINDS, which the region gets in any case.
     """
     is_sharp = bool(np.count_nonzero(bars(shutter)) <= 1)
     is_scribble = kind not in strips.LAID
@@ -82,10 +84,11 @@ def _undrawn(effect: PropertyGroup, shutter: PropertyGroup) -> PropertyGroup | N
 def new_layer(effect: PropertyGroup, region: PropertyGroup, name: str = "layer") -> AnnotationLayer:
     """Give a region an empty annotation layer, and return the layer.
 
-    The layer has the region's name and its shutter's color, or the color NOT_THIS if it is the "not_layer".
+    It has the region's name and its shutter's color, or the color NOT_THIS if it is the "not_layer".
 
     Args:
-        name: Which of the region's layers, one of annotations.LAYERS.
+        name: The region's property for the layer, one of annotations.LAYERS: "layer" (its strokes) or, for a subject,
+            "not_layer" (strokes on what it is not) or "outline_layer" (outlines that correct it).
     """
     layer = annotation(effect).layers.new(region.name, set_active=name == "layer")
     layer.color = NOT_THIS if name == "not_layer" else effect.shutters[region.shutter].color
@@ -96,11 +99,13 @@ def new_layer(effect: PropertyGroup, region: PropertyGroup, name: str = "layer")
 def draw_curves(
     effect: PropertyGroup, strip: Strip, region: PropertyGroup, curves: Curves | Sequence[np.ndarray], frame: int
 ) -> None:
-    """Make curves the drawing of a region at a timeline frame, in place of any that the region has there.
+    """Store curves as the drawing of a region at a timeline frame, in place of one that it has at that frame.
 
     Args:
         strip: The effect strip, whose transform places the curves in the sequencer's image.
+        region: The region. Curves of a subject are outlines that correct it ("outline_layer").
         curves: Points (n, 2) of each curve, in fractions of the picture.
+        frame: The timeline frame.
 
     Raises:
         EffectError: The strip has a scale of 0.
@@ -157,10 +162,10 @@ def assign_region(effect: PropertyGroup, index: int, shutter: PropertyGroup) -> 
 
 
 def hold_drawings(effect: PropertyGroup, index: int) -> None:
-    """Note for each drawing of a region where the region was when it was drawn, unless that is noted already.
+    """Store, for each drawing of a region, the region's placement when it was drawn, unless that is stored already.
 
-    Call this before the region is moved: its strokes then move along. Do nothing for mattes, ramps, outlines and
-    subjects (strips.LAID).
+    Call this before the region is first moved: its strokes then move along from where they were drawn. Do nothing for
+    mattes, ramps, outlines and subjects (strips.LAID).
 
     Args:
         index: Index of the region.
@@ -173,15 +178,17 @@ def hold_drawings(effect: PropertyGroup, index: int) -> None:
 def begin_drawing(effect: PropertyGroup, strip: Strip, index: int, *, erases: bool = False) -> None:
     """Prepare a region's drawing at the current frame for the pen, so that strokes appear where they are drawn.
 
-    A drawing made at this frame before its region moved is first stored where it appears now. The eraser also needs the
-    strokes that are shown here from another frame's drawing, so a copy of these is stored at this frame.
+    If the region has moved since a drawing was made at this frame, store the drawing where it appears now. The eraser
+    also needs the strokes that appear here from another frame's drawing, so store a copy of them at this frame. If the
+    region was tracked, insert keyframes of the user's here. Do nothing for mattes, ramps, outlines and subjects
+    (strips.LAID).
 
     Args:
-        index: Of the region.
+        index: Index of the region.
         erases: Whether strokes will be erased.
 
     Raises:
-        EffectError: The region's strokes or place cannot be known at this frame.
+        EffectError: The region's strokes or placement at this frame cannot be read.
     """
     region, scene = effect.regions[index], effect.id_data
     frame = scene.frame_current

@@ -18,9 +18,10 @@ from ..rendering import previews
 
 
 def follow() -> None:
-    """Give open previews the annotation of the effect that they show at the playhead, and show it only to the pen.
+    """Give each open preview the annotation of the effect that it shows at the playhead, for the pen to draw in.
 
-    Replace another effect's annotation, but never the user's own.
+    Never replace an annotation of the user's. Let Blender show an effect's annotation only while the pen is down; at
+    other times, our draw handler draws its strokes.
     """
     for window in bpy.data.window_managers[0].windows:
         seen = selection.seen(window.workspace.sequencer_scene or window.scene)
@@ -38,11 +39,13 @@ def is_laid_wrong(space: SpaceSequenceEditor) -> bool:
 
 
 def is_other(space: SpaceSequenceEditor, seen: tuple | None) -> bool:
-    """Tell whether a preview has to get another annotation: it has that of an effect that it does not show.
+    """Tell whether a preview needs another annotation, because it has that of an effect that it does not show.
 
-    A preview without one needs one only if its effect's was taken away before.
+    An annotation of the user's is never replaced. A preview without an annotation needs one only if it shows an effect
+    and had an effect's annotation that the extension or undo took away.
 
     Args:
+        space: The preview.
         seen: What selection.seen returns for the preview's scene: the visible effect; None: no effect is visible.
     """
     wanted = seen[1].scene.annotation if seen else None

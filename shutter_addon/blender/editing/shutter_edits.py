@@ -28,11 +28,11 @@ COLORS = (
 
 
 def start(effect: PropertyGroup) -> None:
-    """Set up a new effect: a shutter *Long* for the whole picture, and a shutter *Sharp* for strokes.
+    """Set up a new effect: a shutter *Long* for the whole picture, a shutter *Sharp* for strokes, and some options.
 
-    With *Border*, the first stroke is sharp only around itself instead of everywhere. Streaks keep their length at the
-    ends of the clip, and are smooth if OpenCV is installed. This is set here and not by defaults, because recipes set
-    these options themselves, and older files have other defaults.
+    *Border* is on: the first stroke is sharp only around itself instead of everywhere. Streaks keep their length at the
+    ends of the clip, and are smooth if OpenCV is installed. These options are set here and not by defaults, because
+    recipes set them themselves, and older files have other defaults.
     """
     effect.border, effect.edges = True, "SLIDE"
     effect.inbetween = "1" if opencv.cv2 is None else "AUTO"
@@ -60,12 +60,12 @@ def add_shutter(effect: PropertyGroup, name: str = "", preset: str = "ANGLE_360"
 
 
 def apply_preset(effect: PropertyGroup, index: int, preset: str, key: bool = False) -> None:
-    """Give a shutter the bars of a preset. It keeps to the preset when the window changes (consistency.preset_of).
+    """Give a shutter the bars of a preset. They adapt to later changes of the window until they are edited or keyed.
 
     Args:
-        index: Of the shutter.
+        index: Index of the shutter.
         preset: A key of shutters.PRESETS.
-        key: Insert keyframes at the current frame.
+        key: Also insert keyframes for the bars at the current frame.
 
     Raises:
         EffectError: The window's length is out of range. Nothing has changed.
@@ -109,10 +109,13 @@ def remove_shutter(effect: PropertyGroup, index: int) -> None:
 
 
 def add_time_map(effect: PropertyGroup, ramp: str) -> PropertyGroup:
-    """Add shutters that show the window's first and last frame, and a ramp from one to the other. Return the ramp.
+    """Add a shutter for the window's first frame, one for its last, and a ramp region between them. Return the region.
+
+    The picture then shows the first frame where the ramp begins, later frames along it, and the last frame where it
+    ends, as with a rolling shutter. For this, set the effect's interpolation to "DISPLACEMENT".
 
     Args:
-        ramp: An item of choices.RAMPS.
+        ramp: The ramp's direction or kind, an item of choices.RAMPS.
 
     Raises:
         EffectError: The window's length is out of range. Nothing has changed.
@@ -125,15 +128,18 @@ def add_time_map(effect: PropertyGroup, ramp: str) -> PropertyGroup:
 def ramp_between(
     effect: PropertyGroup, first: tuple[str, str], last: tuple[str, str], name: str, ramp: str
 ) -> PropertyGroup:
-    """Add two shutters and a ramp region from the first to the second, and return the ramp.
+    """Add two shutters and a ramp region, along which the first gives way to the second. Return the region.
 
-    The first shutter becomes the default.
+    The first shutter becomes the default, which exposes what no region covers. The region uses the second.
 
     Args:
         first: Name and preset (a key of shutters.PRESETS) of the first shutter.
         last: Name and preset of the second shutter.
-        name: Name of the ramp.
+        name: Name of the region.
         ramp: The ramp's direction or kind, an item of choices.RAMPS.
+
+    Raises:
+        EffectError: The window's length is out of range. Nothing has changed.
     """
     add_shutter(effect, *first)
     move(effect, "shutter", effect.active_shutter, 0)
@@ -141,15 +147,20 @@ def ramp_between(
 
 
 def as_layer(effect: PropertyGroup, index: int, own: str, rest: str, key: bool = False) -> None:
-    """Make a region a layer in front of the rest of the picture, exposed by a shutter that it alone uses.
+    """Make a region a layer in front of the rest of the picture, exposed by a shutter that no other region uses.
 
-    That shutter and the default one, which exposes the rest, no longer follow a motion, and the window is centered.
+    If its shutter is the default, or other regions use it, it gets a new one. The layer's shutter and the default,
+    which exposes the rest, get presets. They no longer follow a motion, and their exposure has a fixed number of
+    frames. The window is centered on the shown frame.
 
     Args:
         index: Index of the region.
-        own: Preset of the layer's shutter.
+        own: Preset (a key of shutters.PRESETS) of the layer's shutter.
         rest: Preset of the default shutter.
-        key: Insert keyframes for the bars.
+        key: Also insert keyframes for the bars of both at the current frame.
+
+    Raises:
+        EffectError: The window's length is out of range.
     """
     region = effect.regions[index]
     place = effect.shutters.find(region.shutter)

@@ -113,11 +113,12 @@ def restore(scene: Scene, identity: str) -> Scene | None:
 
 
 def _restore(scene: Scene, effect: PropertyGroup, data: dict, content: dict) -> None:
-    """Fill an effect with properties, keyframes and strokes that were kept.
+    """Fill an effect with properties, keyframes and strokes that _keep has kept.
 
     Args:
-        data: What _keep has kept; only its F-curves and strokes are used.
-        content: Values of the effect's properties, by name.
+        scene: The scene that has the effect.
+        data: What _keep has kept. Only its F-curves and annotation layers are used here.
+        content: Values of the effect's properties, by name: those in `data`, or some of them.
     """
     _fill(effect, content)
     for plain in data["curves"]:

@@ -27,10 +27,10 @@ class Layout:
     """Where the bar editor and its bars lie in the preview's region, in pixels.
 
     Attributes:
-        frame: Box around everything: left, bottom, right, top.
-        box: Box around the bars.
+        frame: Box around the whole editor: left, bottom, right, top.
+        box: Box around the bars, below the header: left, bottom, right, top.
         count: Number of bars.
-        top: Weight of a bar that reaches the upper edge of `box`.
+        top: Weight at the upper edge of `box`; a bar with weight 0 has no height.
     """
 
     frame: tuple[float, float, float, float]
@@ -54,11 +54,13 @@ class Layout:
 
 
 def layout(width: float, bars: np.ndarray, unit: float) -> Layout:
-    """Return the layout of the bar editor, at the lower left of a preview.
+    """Return the layout of the bar editor, at the lower left of a preview. It is narrower in a narrow region.
+
+    The highest bar, or the weight 1 if that is higher, reaches the upper edge of the box.
 
     Args:
-        width: Of the preview's region, in pixels.
-        bars: The bars (L,) to show.
+        width: Width of the preview's region in pixels.
+        bars: The bars (L,) to show: a weight for each frame.
         unit: Pixels per interface unit.
     """
     margin, pad = _MARGIN * unit, _PAD * unit
@@ -76,16 +78,17 @@ def _layout(context: Context, bars: np.ndarray) -> Layout:
 def painted(
     values: np.ndarray, place: Layout, start: tuple[float, float], end: tuple[float, float], snap: bool
 ) -> np.ndarray:
-    """Return bars (L,) after the pointer was dragged between two points: each bar on the way gets a new weight.
+    """Return bars (L,) after the pointer was dragged from one point to another: each bar on the way gets a new weight.
 
-    It is the weight at the height of the line between the points.
+    The weight is read at the height of the straight line between the points, and limited to 0 to `place.top`. Within a
+    single bar, it is read at the end point.
 
     Args:
         values: The bars before, (L,).
         place: Where the bars lie.
-        start: Point in pixels of the region.
-        end: Point in pixels of the region.
-        snap: Round weights to multiples of _SNAP.
+        start: Start point (x, y) in pixels of the region.
+        end: End point (x, y) in pixels of the region.
+        snap: Round new weights to multiples of _SNAP.
     """
     result = np.array(values, dtype=np.float64)
     first, last = place.bar_at(start[0]), place.bar_at(end[0])

@@ -41,7 +41,7 @@ def line_width() -> float:
 
 
 def wrapped(words: str, width: float, size: float | None = None) -> list[str]:
-    """Break a text into lines that are at most `width` pixels wide.
+    """Break a text between words into lines of at most `width` pixels. A word that is wider has a line of its own.
 
     Args:
         size: Size of the letters in points; None: as in Blender's panels.
@@ -91,11 +91,12 @@ def rectangles(boxes: Sequence[Box] | np.ndarray, colors: ArrayLike) -> None:
 
 
 def bars(box: Box, shares: np.ndarray, color: Sequence[float]) -> list[Box]:
-    """Draw bars side by side in a box, and return the box of each bar.
+    """Draw bars side by side in a box, with narrow gaps if there is room, and return the box of each bar.
 
     Args:
-        shares: Heights (n,) as fractions of the box. Each bar is at least one line high.
-        color: Display values 0 to 1, with alpha.
+        box: The box, in pixels of the region.
+        shares: Heights (n,) as fractions 0 to 1 of the box's height. Each bar is at least line_width() high.
+        color: Red, green, blue and alpha, display values 0 to 1.
     """
     left, bottom, right, top = box
     edges = np.linspace(left, right, len(shares) + 1)
@@ -109,11 +110,11 @@ def bars(box: Box, shares: np.ndarray, color: Sequence[float]) -> list[Box]:
 
 
 def swatch(left: float, bottom: float, size: float, shutter: PropertyGroup, index: int) -> None:
-    """Draw a square with a shutter's color and pattern, as the view *Mattes* shows its pixels.
+    """Draw a square with a shutter's color and pattern, which mark the shutter's pixels in the view *Mattes*.
 
     Args:
-        size: Side of the square.
-        left, bottom: Lower left corner.
+        left, bottom: Lower left corner, in pixels of the region.
+        size: Side of the square in pixels.
         index: Index of the shutter, which determines the pattern.
     """
     left, bottom = round(left), round(bottom)
@@ -126,9 +127,10 @@ def swatch(left: float, bottom: float, size: float, shutter: PropertyGroup, inde
 
 
 def lines(points: ArrayLike, color: Sequence[float], closed: bool = False, width: float = 1.0) -> None:
-    """Draw a line through points (n, 2).
+    """Draw a line through points (n, 2), in pixels. Draw nothing for fewer than 2 points.
 
     Args:
+        color: Red, green, blue and alpha, display values 0 to 1.
         closed: Also draw from the last point to the first.
         width: Width of the line, in multiples of line_width().
     """
@@ -173,7 +175,13 @@ def text_width(words: str) -> float:
 
 
 class Quad:
-    """Draws pictures where a preview shows a strip's picture: moved, cropped and cut off in the same way."""
+    """Draws pictures over a preview exactly where it shows an effect strip's own picture.
+
+    They have the strip's transform and crop, and end where the sequencer's image ends.
+
+    Attributes:
+        shaders: Compiled shaders by the name of their pass, shared by all objects.
+    """
 
     shaders: dict[str, GPUShader] = {}  # by pass, because compiling takes long
 
@@ -187,14 +195,14 @@ class Quad:
         self._high = 1 - np.array([crop.max_x / width, crop.max_y / height])
 
     def draw(self, name: str, textures: dict, left: float = 0.0, right: float = 1.0, **constants) -> None:
-        """Draw a picture, or a part of its width, with a pass of shaders/show.glsl.
+        """Draw a picture, or a part of its width, with a pass of shaders/show.glsl. Cropped parts are left out.
 
         Args:
             name: Name of the pass.
-            textures: The pass's textures, by sampler name.
+            textures: The textures that the pass reads, by sampler name.
             left: Left edge of the drawn part, as a fraction of the picture's width.
-            right: Right edge of it.
-            constants: Values of the pass's constants.
+            right: Right edge of the drawn part, as a fraction of the picture's width.
+            constants: Values of the pass's constants, by name, such as its opacity.
         """
         low, high = np.maximum(self._low, (left, 0)), np.minimum(self._high, (right, 1))
         if (low >= high).any():

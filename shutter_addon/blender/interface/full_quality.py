@@ -60,7 +60,7 @@ def _shown(context: Context) -> tuple[Window, Area, preview_areas.Shown] | None:
 def _bring_back(address: int, proxies: tuple[str, bool], rows: float, centre: tuple[float, float]) -> float | None:
     """Restore zoom, center and proxy settings of a preview once *Full Quality* has ended. This is a timer of Blender.
 
-    Settings that the user has changed meanwhile stay.
+    Zoom and center stay if the user has changed the zoom meanwhile; proxy settings stay if the user has changed them.
 
     Args:
         address: Address of the preview's area (as_pointer()).
@@ -69,7 +69,7 @@ def _bring_back(address: int, proxies: tuple[str, bool], rows: float, centre: tu
         centre: Center to restore, as in `_view_of`.
 
     Returns:
-        Seconds until the next call; None: it is done.
+        Seconds until Blender calls this again, while *Full Quality* is on; None: it has ended, and the timer ends, too.
     """
     if previews.looking.whole is not None:
         return _TICK

@@ -17,9 +17,13 @@ TWEAK = ("gizmogroup.gizmo_tweak", "LEFTMOUSE", "PRESS", {"any": True})
 class Dragged(Mixin):
     """A gizmo that is drawn and can be dragged while it has something to show.
 
-    Subclasses have `seen(context)`, which returns what to draw or None; `show(context, seen)`, which draws it;
-    `is_at(context, seen, location)`, which tells whether a point of the region hits it; `grab(context, event, seen)`,
-    which begins to drag; and `drag(context, event, tweak)`, which follows the pointer.
+    Subclasses have these methods:
+
+    - `seen(context)` returns what to draw, or None if there is nothing. Others get this as `seen`.
+    - `show(context, seen)` draws it.
+    - `is_at(context, seen, location)` tells whether a point (x, y) of the region, in pixels, is on it.
+    - `grab(context, event, seen)` begins to drag when the mouse button is pressed.
+    - `drag(context, event, tweak)` follows the pointer; `tweak` is Blender's set of "SNAP" and "PRECISE".
     """
 
     def setup(self) -> None:
@@ -47,8 +51,11 @@ class Dragged(Mixin):
 class InPreview(Mixin):
     """A gizmo group that shows one gizmo in previews with an effect, while the live preview is on.
 
-    Subclasses have `gizmo`, the gizmo's class, and `is_wanted(live)`, which tells whether the settings of the live
-    preview want it.
+    Subclasses also have `is_wanted(live)`, unless they replace `poll`: it tells whether to show the gizmo by the
+    settings of the live preview (ShutterPreview).
+
+    Attributes:
+        gizmo: The gizmo's class.
     """
 
     bl_space_type = "SEQUENCE_EDITOR"
@@ -66,10 +73,13 @@ class InPreview(Mixin):
 
 
 class WithKeys(InPreview):
-    """A gizmo group with shortcuts and its own `poll`. Blender's key for annotating (D) also works over its gizmos.
+    """A gizmo group with shortcuts, which work while the pointer is over its gizmo. Subclasses have their own `poll`.
+
+    D with a mouse drag, which annotates in Blender, also works there.
 
     Attributes:
-        shortcuts: Of each, the operator, type and value of the event, and further arguments of keymap_items.new.
+        shortcuts: For each: bl_idname of the operator, type and value of the event, and a dictionary of further
+            arguments for keymap_items.new.
     """
 
     shortcuts: tuple[tuple[str, str, str, dict], ...] = (TWEAK,)

@@ -20,11 +20,14 @@ def a_region(effect: PropertyGroup) -> str | None:
 
 
 def _of_kind(kinds: Collection[str], sentence: str) -> Need:
-    """Return a condition: a function that returns why the active region is of none of some kinds, or None.
+    """Make a condition for operators: there is an active region, and it is of one of these kinds.
 
     Args:
         kinds: Items of choices.KINDS.
-        sentence: Why another region does not fit, in English.
+        sentence: Why a region of another kind does not fit, in English.
+
+    Returns:
+        A function that takes an effect and returns why it does not meet the condition, translated; None: it does.
     """
 
     def need(effect: PropertyGroup) -> str | None:

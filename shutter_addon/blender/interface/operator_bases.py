@@ -29,7 +29,9 @@ def redraw(context: Context) -> None:
 
 
 def report(operator: Operator, sentence: str, kind: str = "WARNING") -> set[str]:
-    """Show a translated sentence as an operator's warning or error. *Copy Report* gets it without names and paths.
+    """Show a translated sentence as an operator's warning or error.
+
+    *Copy Report* gets the line of code that called this instead of the sentence, which may contain the user's names.
 
     Args:
         kind: "WARNING" or "ERROR".
@@ -43,7 +45,9 @@ def report(operator: Operator, sentence: str, kind: str = "WARNING") -> set[str]
 
 
 def given(kind: Callable, name: str, description: str, **more: Any) -> Any:
-    """Make a property for an operator, which buttons set and whose value Blender does not remember for the next call.
+    """Make a property of an operator that gets its value from each button, and otherwise has its default.
+
+    Blender does not use the value of the last call again (SKIP_SAVE).
 
     Args:
         kind: A function of bpy.props, such as StringProperty.
@@ -94,10 +98,14 @@ class Named(Mixin):
         return None
 
     def tried(self, step: Callable[..., set[str] | None], *arguments: object) -> set[str]:
-        """Call a step of the operator, and report errors that the user can cause.
+        """Call a step of the operator, and show errors that the user can cause (FAULTS, UserError). Others are raised.
+
+        Args:
+            step: The function to call.
+            arguments: Its arguments.
 
         Returns:
-            The step's result, {"FINISHED"} if that is None, or {"CANCELLED"} after an error.
+            The step's result, {"FINISHED"} if that is None, or {"CANCELLED"} after an error that was shown.
         """
         try:
             return step(*arguments) or {"FINISHED"}
@@ -106,14 +114,15 @@ class Named(Mixin):
 
 
 class OfEffect(Named):
-    """An operator that changes the effect of the active strip, or else the one that is visible (selection.active).
+    """An operator that changes the active effect: usually that of the active strip (selection.active).
 
-    Subclasses have `change(context, effect)`, which does the work.
+    Subclasses have `change(context, effect)`, which does the work and returns the operator's result; None: finished.
 
     Attributes:
-        needs: Functions that return why the effect does not fit, or None. The first reason is shown.
-        only_seen: Whether the effect has to be visible in the preview.
-        edit: Scene of the effect, set before `change` is called.
+        needs: Conditions: functions that take the effect and return why it does not fit, or None. The operator is
+            greyed out if one returns a reason, and its tooltip shows the first.
+        only_seen: Whether the effect also has to be visible in the preview.
+        edit: Scene that has the effect, set before `change` is called.
         effect_strip: The effect strip, set before `change` is called.
     """
 
@@ -142,15 +151,18 @@ class OfEffect(Named):
 def operator(
     label: str, *needs: Need, icon: str = "NONE", options: set[str] = UNDOABLE, only_seen: bool = False, **own: Any
 ) -> Callable[[Change], type[Operator]]:
-    """Return a decorator that makes an operator class from a function that changes an effect.
+    """Return a decorator that makes an operator class (OfEffect) from a function that changes an effect.
 
-    The function's name becomes the operator's, and its docstring the tooltip.
+    The function takes the operator, the context and the effect. It returns the operator's result; None: finished. Its
+    name becomes the operator's bl_idname, after "shutter.", and its docstring the tooltip.
 
     Args:
         label: The operator's name for users.
-        needs, icon, only_seen: As in OfEffect and Named.
+        needs: Conditions that the effect has to meet, as in OfEffect.
+        icon: Icon in menus.
         options: bl_options.
-        own: Properties of the operator. Menus show the items of the first enum as a submenu.
+        only_seen: Whether the effect has to be visible in the preview.
+        own: The operator's properties by name. Menus show the items of the first EnumProperty as a submenu.
     """
 
     def made(change: Change) -> type[Operator]:
@@ -174,13 +186,16 @@ def operator(
 class Beside(Named):
     """An operator that works in steps while Blender stays usable, but all at once in the background and in scripts.
 
-    Subclasses have `begin(context, waits)`, which does everything if `waits`, and otherwise returns `go_on(context)`;
-    `goes_on(context)`, which does a step and returns whether there are more; and `end(context, is_stopped)`, called
-    after the last step or Esc. `tried` handles what `begin` and `end` return or raise.
+    Subclasses have these methods; `tried` shows errors of `begin` and `end`:
+
+    - `begin(context, waits)` does all the work if `waits`, and otherwise prepares it and returns `go_on(context)`.
+    - `goes_on(context)` does a step, and returns whether there are more.
+    - `end(context, is_stopped)` is called after the last step or, with `is_stopped`, after the user has pressed Esc.
 
     Attributes:
         tick: Seconds between steps.
-        blocks: Whether Blender ignores other input meanwhile.
+        blocks: Whether Blender ignores other input between the steps.
+        timers: Timers of all running operators of this kind.
     """
 
     tick = 0.1

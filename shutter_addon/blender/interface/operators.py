@@ -38,10 +38,10 @@ def why_no_effect(context: Context) -> str | None:
 
 
 def give_effect(context: Context) -> None:
-    """Add an effect with the usual shutters to the active strip, select the effect strip and show its panel.
+    """Add an effect with the shutters of shutter_edits.start to the active strip, select its strip and show its panel.
 
     Raises:
-        FAULTS: The strip's footage cannot be read.
+        FAULTS: One of the errors in effect_source.FAULTS: the strip's footage cannot be read.
     """
     scene = selection.scene_of(context)
     strip, effect = add_effect.add_effect(scene, selection.active_strip(context))
@@ -113,10 +113,14 @@ def clean_trail(_self: Operator, context: Context, effect: PropertyGroup) -> Non
 
 
 def _choose_tab(waits: Iterator[float]) -> float | None:
-    """Open the sidebar's Shutter tab in all previews, once they are drawn. This is a timer of Blender.
+    """Open the sidebar's Shutter tab in all previews, once the sidebars are drawn. This is a timer of Blender.
 
     Args:
-        waits: Seconds to wait, one value for each try while a sidebar is not drawn yet. After the last, give up.
+        waits: Seconds until the next try, while a sidebar is not drawn yet. When no value is left, leave out such
+            sidebars.
+
+    Returns:
+        Seconds until the next try; None: it is done.
     """
     areas = [area for _window, area in preview_areas.previews(bpy.context)]
     sidebars = [next(region for region in area.regions if region.type == "UI") for area in areas]
@@ -155,15 +159,15 @@ _DIRECTION = EnumProperty(name="Direction", items=(("UP", "Up", ""), ("DOWN", "D
 
 
 def _move(effect: PropertyGroup, kind: str, direction: str, places: list[int]) -> set[str] | None:
-    """Move the active shutter or region one place up or down in its list.
+    """Move the active shutter or region one place up or down in its list in the sidebar.
 
     Args:
         kind: "shutter" or "region".
         direction: "UP" or "DOWN".
-        places: Indices of the items that the list shows.
+        places: Indices, in the effect, of the items that the list shows: a list of regions shows only some.
 
     Returns:
-        {"CANCELLED"} if the item is at that end of the list already, else None.
+        {"CANCELLED"} if the item already is the first or last of the list, else None.
     """
     index = getattr(effect, f"active_{kind}")
     step = places.index(index) + (1 if direction == "DOWN" else -1)
@@ -280,8 +284,10 @@ def erase(self: Operator, context: Context, effect: PropertyGroup) -> None:
 def _take_tool(by: Operator, context: Context, effect: PropertyGroup, tool: str, layer: str = "layer") -> None:
     """Activate an annotation tool in all previews, to draw on an annotation layer of the active region.
 
+    Make the layer if the region lacks it. If no preview is open, tell the user to open one.
+
     Args:
-        by: The operator that reports if there is no preview.
+        by: The running operator, which tells the user.
         tool: Blender's identifier of the tool.
         layer: Which of the region's layers, one of annotations.LAYERS.
     """

@@ -29,7 +29,9 @@ def sentence(layout: UILayout, words: str, icon: str = "NONE", room: float = 1.0
     """Draw a translated sentence, broken into as many lines as the panel's width needs.
 
     Args:
-        room: Fraction of the panel's width that the sentence has.
+        words: The sentence.
+        icon: Icon before the first line.
+        room: Fraction 0 to 1 of the panel's width that the layout has.
         is_quiet: Draw it greyed out.
     """
     unit, region = drawing.ui_scale(), bpy.context.region
@@ -44,11 +46,12 @@ def sentence(layout: UILayout, words: str, icon: str = "NONE", room: float = 1.0
 
 
 def draw_list(layout: UILayout, effect: PropertyGroup, kind: str, count: int) -> None:
-    """Draw the list of shutters or regions with its buttons, such as Add and Remove.
+    """Draw the list of an effect's shutters or regions with its buttons, such as Add and Remove.
 
     Args:
         kind: "shutter" or "region".
-        count: Number of items that the list shows.
+        count: Number of items that the list shows, which determines its height. Regions of inactive shutters are
+            hidden.
     """
     row = layout.row()
     rows = min(max(count, 1), _MOST_ROWS)
@@ -69,10 +72,11 @@ def draw_list(layout: UILayout, effect: PropertyGroup, kind: str, count: int) ->
 def draw_operators(layout: UILayout, *names: str) -> None:
     """Draw buttons or menu entries for operators of the extension.
 
-    An operator with `choices` becomes a submenu of its choices.
+    An operator with `choices` (see operator_bases.Named) becomes a submenu of them, unless it is greyed out.
 
     Args:
-        names: Names of operators, without "shutter."; "" draws a separator. Those of removed features are left out.
+        names: Names of operators, without "shutter."; "" draws a separator. Operators that do not exist, because their
+            feature was removed from the extension, are left out.
     """
     for name in names:
         if not name:
@@ -95,15 +99,17 @@ def draw_properties(layout: UILayout, owner: bpy.types.bpy_struct, *names: str) 
 def panel(
     end: str, label: str, draws: Draws, shows: Callable | None = None, within: str = "", **look: object
 ) -> type[Panel]:
-    """Make a panel of the Shutter tab about the active effect, closed by default.
+    """Make the class of a panel of the Shutter tab, closed by default. It shows something of the active effect.
+
+    Without an active effect, it is hidden.
 
     Args:
-        end: End of its class name, after SEQUENCER_PT_shutter.
-        label: Its title.
-        draws: Draws its content.
-        shows: Takes the effect; the panel is hidden while it returns None or False. None: it is always shown.
-        within: `end` of the panel that contains it; "": the first panel.
-        look: Other class attributes for Blender.
+        end: End of the class name, after SEQUENCER_PT_shutter.
+        label: Title of the panel.
+        draws: Draws the content: takes the layout, the scene, the effect and the effect strip.
+        shows: Takes the effect, and returns whether to show the panel; None: always show it.
+        within: `end` of the panel that contains it; "": the first panel of the tab contains it.
+        look: Other attributes of the class, such as bl_options.
     """
 
     def poll(_cls: type[Panel], context: Context) -> bool:

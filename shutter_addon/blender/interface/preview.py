@@ -80,9 +80,10 @@ class ShutterPreview(PropertyGroup):
 
 
 def _draw() -> None:
-    """Draw the picture, strokes and notes over a preview. Blender calls this draw handler whenever it has drawn one.
+    """Draw the effect's picture, strokes and notes over the sequencer's own picture in a preview.
 
-    Changed strokes are noticed here, too, as Blender does not report them. Gizmos draw themselves.
+    This is a draw handler, which Blender calls whenever it has drawn a preview. As Blender does not report new strokes,
+    also look for them here, and have changed effects drawn again. Gizmos draw themselves.
     """
     context = bpy.context
     blender_gpu.free_unused()

@@ -332,12 +332,13 @@ def _cancel() -> None:
 
 
 def _remove_spent() -> float | None:
-    """Remove the scenes and objects that _cancel has made, once the render has ended. Works as a timer of Blender.
+    """Remove what _cancel has made for its small renders (scenes, camera objects), once no render runs.
 
-    During the render, Blender would free data of other effects in the same frame along with them, and crash.
+    Works as a timer of Blender. During a render this would crash: Blender would also free data of other effects in the
+    same frame.
 
     Returns:
-        Seconds until the next try, for the timer; None: all is removed.
+        Seconds until Blender calls it again, if a render still runs. None: everything is removed, and the timer ends.
     """
     if bpy.app.is_job_running("RENDER"):
         return _PATIENCE

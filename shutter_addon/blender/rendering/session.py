@@ -37,11 +37,11 @@ Place = tuple[int, bool]  # SourceKey.place
 
 
 class Work(NamedTuple):
-    """A function that a session's device is running or will run.
+    """A function call that a session has queued or is running: a handle to wait for its result, or to cancel it.
 
     Attributes:
-        future: Of its result.
-        ended: Makes it end before its next step when it is set.
+        future: Gets the function's result, or the error that it raises.
+        ended: Once it is set, the function raises StoppedError at its next call of stopping.check.
     """
 
     future: Future
@@ -52,10 +52,11 @@ class Work(NamedTuple):
         self.future.cancel()
 
     def result(self) -> Any:
-        """Wait for the result and return it. Break the work off if the result is no longer wanted.
+        """Wait for the function's result and return it. Cancel the function if the caller's own work is cancelled.
 
         Raises:
             StoppedError, NoDeviceError: As in result_of.
+            Exception: Whatever the function raised.
         """
         try:
             return result_of(self.future)
@@ -65,11 +66,16 @@ class Work(NamedTuple):
 
 
 def result_of(future: Future[T]) -> T:
-    """Wait for a future and return its result. On the window's main thread, serve calls from other threads.
+    """Wait for a future and return its result.
+
+    On the main thread of a Blender with a window, make the calls to Blender's GPU that other threads ask for meanwhile.
+    The future may depend on them.
 
     Raises:
-        StoppedError: The result is no longer wanted (stopping.once).
-        NoDeviceError: The work needs Blender's GPU, which cannot be used now, so waiting would never end.
+        StoppedError: The calling thread's work was cancelled (stopping.check).
+        NoDeviceError: On that main thread: such calls wait, but Blender's GPU cannot be used now. Waiting would never
+            end.
+        Exception: Whatever the future's function raised.
     """
     is_window = where() is Where.WINDOW
     while not wait([future], 0 if is_window else _PATIENCE).done:
@@ -87,13 +93,16 @@ def broken_off(stopped: Callable[[], bool], function: Callable[..., T], *argumen
 
 @dataclass(frozen=True)
 class RenderContext:
-    """For whom pictures are made: with which session, and in which form.
+    """Which session makes pictures for a caller (a preview or a render), and in which pixel format.
 
     Attributes:
-        session: Makes them on its device.
-        say: Called with a sentence for the user about a lesser device, or about what cannot be done.
-        levels: Whether pictures are 8-bit display levels (Request.levels).
-        display: How light becomes these levels (Request.display); None: as Request has it by default.
+        session: Makes the pictures on its device.
+        say: Called with a sentence for the user when a slower device than wanted is used, or when something cannot be
+            done.
+        levels: Whether pictures have 8-bit sRGB values over black (Request.levels). Otherwise they are scene-linear
+            float32.
+        display: Converts the finished scene-linear picture to the 8-bit values of Blender's output (Request.display);
+            `levels` is then False. None: no such conversion.
     """
 
     session: RenderSession
@@ -102,17 +111,20 @@ class RenderContext:
     display: Display | None = None
 
     def request(self, snapshot: Snapshot, frame: float, detail: Detail | None = None) -> Request:
-        """Return the request for an effect strip's picture at a timeline frame: what it depends on, as plain data.
+        """Return the request for an effect strip's picture at a timeline frame.
+
+        It has all that the picture depends on, as plain data. This opens the footage if necessary. The last request of
+        each effect is kept, and returned again for the same arguments.
 
         Args:
             snapshot: The effect and its source, as plain data.
-            frame: The timeline frame.
-            detail: The picture's detail. None: that of the effect's last picture, or full detail if there is none. This
-                suffices for a caller that only reads the request and makes no picture.
+            frame: The timeline frame, which may lie between two whole ones.
+            detail: Size, proxy and smoothness of the picture. None: as RenderSession.last_detail. That is enough if the
+                caller only reads the request and makes no picture.
 
         Raises:
             effect_source.FAULTS: The effect cannot be shown.
-            StoppedError: The picture is no longer wanted.
+            StoppedError: The calling thread's work was cancelled.
         """
         session = self.session
         key = SourceKey.of(snapshot, detail or session.last_detail(snapshot.scene))
@@ -135,18 +147,25 @@ class RenderContext:
 
 
 class RenderSession:
-    """A device that composes pictures, and the renderers of the effects that were shown last, which keep their frames.
+    """A device that composes pictures, with a renderer for each of the effects shown last.
 
-    The device is opened when it is first used. If it can be used from any thread, it works on a thread of its own.
+    Renderers keep the frames that they have loaded, so that the next picture needs few new ones. At most _KEPT effects
+    have renderers; the ones unused for longest are closed.
+
+    The device is opened when it is first used. Blender's own GPU ("blender") works on the calling thread, any other
+    device on a thread that belongs to the session.
     """
 
     def __init__(self, choose: Callable[[], Chosen], ask_others: Callable[[], None], late: Late | None = None) -> None:
-        """Make a session, without opening anything.
+        """Make a session. This opens neither a device nor footage.
 
         Args:
-            choose: Returns the device and why it is a lesser one, as available.choose.
-            ask_others: Called when the GPU's memory is full, to free what other sessions have there.
-            late: Called for mattes that are not tracked yet, as in MatteValues; None: pictures wait until they are.
+            choose: Returns the key in available.OPEN of the device to use, and a sentence for the user if it is a
+                slower one than wanted, else None (available.choose).
+            ask_others: Called when the GPU's memory is full, so that other sessions free memory on the same GPU.
+            late: Called with a matte's file and a frame number when a matte's outline is not tracked to that frame yet.
+                The picture is then made with an approximate outline (MatteValues). None: making the picture includes
+                the tracking, and newly computed optical flow is stored for later.
         """
         self._choose, self._ask_others, self._late = choose, ask_others, late
         self._frees_others = False  # whether others free memory, in the middle of a picture
@@ -160,10 +179,12 @@ class RenderSession:
 
     @property
     def device(self) -> str:
-        """The device's name, a key of available.OPEN. The device is chosen once, and again only after `forget`.
+        """The key of the session's device in available.OPEN.
+
+        It is chosen on the first access, and again only after `forget`.
 
         Raises:
-            NoDeviceError: The wanted device is missing.
+            NoDeviceError: The device that the user wants is missing.
         """
         if self._chosen is None:
             self._chosen = self._choose()
@@ -175,9 +196,14 @@ class RenderSession:
         return self.device != "blender"
 
     def run(self, function: Callable[..., T], *arguments: object) -> T:
-        """Call a function that uses the device, wait for its turn, and return its result.
+        """Call a function that uses the device, wait for it, and return its result.
 
-        The call goes on even if the picture being made is no longer wanted.
+        The call runs on the device's thread, after those queued before, or directly if the device has no thread.
+        Cancelling the caller's work (stopping.once) neither ends the call nor the waiting.
+
+        Args:
+            function: The function.
+            arguments: Its positional arguments.
         """
         with stopping.once(stopping.never):
             return self._submit(function, *arguments).result()
@@ -193,11 +219,17 @@ class RenderSession:
         return Work(done, ended)
 
     def picture(self, request: Request) -> np.ndarray:
-        """Return the picture of a request, (H, W, 4), which begin_next may have begun already.
+        """Return the picture of a request, when the device has made it.
+
+        If begin_next has begun the same picture, that one is used. A picture that begin_next has begun for another
+        request of this effect is cancelled.
+
+        Returns:
+            (H, W, 4): float32 scene-linear, or uint8 if the request has `levels` or a `display`.
 
         Raises:
-            effect_source.FAULTS: It cannot be made.
-            StoppedError: It is no longer wanted.
+            effect_source.FAULTS: The picture cannot be made.
+            StoppedError: The calling thread's work was cancelled.
         """
         key, begun = self._begun.pop(request.source.scene, (None, None))
         if begun is not None and key != request.key:
@@ -209,12 +241,17 @@ class RenderSession:
         return self._submit(self.renderer(request.source).picture, request)
 
     def begin_next(self, snapshot: Snapshot, frame: float, context: RenderContext) -> None:
-        """Begin the picture of a film's next frame, if the last two pictures were of successive frames.
+        """Begin a film's next picture of an effect on the device's thread, while Blender still uses the last one.
 
-        The result is used only if exactly this picture is asked for next. Does nothing on a device without a thread.
+        The next timeline frame is `frame` plus the scene's frame step. Its picture is begun only if this call's frame
+        follows that of the effect's last call by one step, and if the next frame lies within the film and the snapshot.
+        If `picture` is asked for another one of the effect, the begun one is cancelled. Does nothing on a device
+        without a thread.
 
         Args:
-            frame: Timeline frame of the last picture.
+            snapshot: The effect and its source, as plain data.
+            frame: Timeline frame of the picture that was just made.
+            context: The pixel format of pictures. Its session is this one.
         """
         if not self.threaded:
             return
@@ -226,7 +263,9 @@ class RenderSession:
                 self._begun[snapshot.scene] = request.key, self._begin(request)
 
     def last_detail(self, scene: int) -> Detail:
-        """Return the detail of an effect's last pictures; without any, full detail.
+        """Return the detail with which an effect's renderer is open, or full detail if none is open.
+
+        If one without and one with moments between filmed frames are open, it is that of the one without.
 
         Args:
             scene: session_uid of the effect scene.
@@ -235,12 +274,18 @@ class RenderSession:
         return known[0].detail if known else FULL
 
     def renderer(self, key: SourceKey, say: Say = print) -> Renderer:
-        """Return the renderer for a key, opened if necessary.
+        """Return the renderer that reads what `key` tells. Open the device and the footage if necessary.
 
-        An effect may have two: one with moments between frames, and one without.
+        An effect may have two open renderers: one with moments (frames computed between filmed ones) and one without.
+        Opening one closes an older one of the same effect and kind that has another key.
+
+        Args:
+            key: The footage and how it is read.
+            say: Called with a sentence for the user if the device is a slower one than wanted.
 
         Raises:
             effect_source.FAULTS: The device or the footage cannot be opened.
+            StoppedError: The calling thread's work was cancelled.
         """
         compositor = self._opened(say)
         known = self._renderers.pop(key.place, None)
@@ -261,10 +306,14 @@ class RenderSession:
         return known[1] if known and known[0] == key else None
 
     def _opened(self, say: Say) -> Any:
-        """Return the compositor, which composes pictures on the device, opened if necessary.
+        """Return the compositor (request.Compositor), which composes pictures on the device. Open it at the first call.
 
         Args:
-            say: Called with a sentence about why the device is a lesser one than wanted.
+            say: Called with a sentence for the user at the first call, if the device is a slower one than wanted.
+
+        Raises:
+            NoDeviceError: The device cannot be opened. The next call tries again.
+            StoppedError: The calling thread's work was cancelled.
         """
         if self._compositor is None:
             with stopping.once(stopping.never):

@@ -21,12 +21,13 @@ _ANSWER = 5.0  # seconds that a job waits for the window to free memory
 
 
 class _Sessions(NamedTuple):
-    """The sessions.
+    """The three render sessions, each with its own device and renderers.
 
     Attributes:
-        offscreen: For renders.
-        window: For previews.
-        waited_for: For a thread that the window waits for (Where.WAITED_FOR), if `offscreen` uses the window's GPU.
+        offscreen: Makes pictures of renders. Its device needs no window.
+        window: Makes previews in Blender's window, on Blender's own GPU.
+        waited_for: Takes the place of `offscreen` for a render during which the window waits for every picture
+            (Where.WAITED_FOR), if `offscreen` uses the window's GPU, which cannot be used then.
     """
 
     offscreen: RenderSession
@@ -35,9 +36,9 @@ class _Sessions(NamedTuple):
 
 
 def _ask_window() -> None:
-    """Have the window's previews free their GPU memory, if called on a render job's thread.
+    """On a render job's thread, have the window's previews free their GPU memory. Elsewhere, do nothing.
 
-    They load frames again when they are drawn.
+    Wait at most _ANSWER seconds for it. Previews load their frames again when they are drawn next.
     """
     if render_job.where() is Where.JOB:
         main_thread.ask(SESSIONS.window.free, _ANSWER)
@@ -72,11 +73,14 @@ def of_engine(say: Say) -> RenderContext:
 def of_render(say: Say = print, *, levels: bool = False, display: Display | None = None) -> RenderContext:
     """Return the context of a render, on a device that does not need a window.
 
+    Its session is `offscreen`, or `waited_for` while Blender's window waits for every picture and `offscreen` would
+    need its GPU (_Sessions).
+
     Args:
         say, levels, display: As in RenderContext.
 
     Raises:
-        NoDeviceError: The wanted device is missing.
+        NoDeviceError: While the window waits for every picture: the device that the user wants is missing.
     """
     session = SESSIONS.offscreen
     if render_job.where() is Where.WAITED_FOR:
@@ -86,9 +90,10 @@ def of_render(say: Say = print, *, levels: bool = False, display: Display | None
 
 
 def close_if_device_changed() -> None:
-    """Close sessions of renders whose device has changed, and all sessions if the memory limit has.
+    """Close the session of renders (`offscreen`) if another device would be chosen now, and `waited_for` in any case.
 
-    Called on the main thread before a render. `waited_for` is always closed.
+    Closes all three sessions if the limit of GPU memory was changed in the settings. Called on the main thread before a
+    render.
     """
     if render_settings.forget_memory_if_changed():
         forget()

@@ -68,12 +68,14 @@ class Budget:
 
 
 def allowed(memory: int | None) -> int:
-    """Return how many bytes textures may take on a GPU.
+    """Return how many bytes textures may take on a GPU, if the user sets no limit.
 
-    It must be the same at each start, so that all parts of a film have the same bits.
+    It is 75 % of the GPU's memory (UNKNOWN if that is unknown), but at most half of the machine's main memory. It does
+    not depend on what is free, so it is the same at each start: pictures can depend on it in their last bits, and all
+    parts of a film must match.
 
     Args:
-        memory: The GPU's bytes. None: unknown.
+        memory: The GPU's memory in bytes. None: unknown.
     """
     # Blender, the screen and the driver need the rest of the GPU's memory.
     limits = [UNKNOWN if memory is None else int(memory * 0.75)]
@@ -95,15 +97,17 @@ def machine_memory() -> int | None:
 
 
 class Texture:
-    """A texture array on a device. Its content can move to the host's memory and back.
+    """A texture array on a device. If memory is short, its content can move to main memory and back.
 
     Attributes:
-        device: The device. None: a small texture that the budget does not count.
+        device: The device that made it. None: a texture that belongs to no budget and never moves, as from Device.send.
         size: (width, height, layers) in texels.
         kind: The GLSL format, as for Device.texture.
-        bytes: Its size on the device.
-        own: The texture object of the graphics library. None: it was released, or its content is on the host.
-        waiting: Its content while that is on the host, (layers, height, width, components), else None.
+        bytes: The bytes that it takes on the device.
+        own: The texture object of the graphics library. None: the texture was released, or its content is in main
+            memory.
+        waiting: Its content (layers, height, width, components) while that is in main memory. None: it is on the
+            device, or the texture was released.
     """
 
     def __init__(self, device: Device | None, size: tuple[int, int, int], kind: str, own: Own = None) -> None:
@@ -135,9 +139,11 @@ class Device:
         name: The renderer's name, as the driver tells it.
         max_size: The most texels along a texture's side.
         max_layers: The most layers of a texture array.
-        budget: The memory of all textures on this GPU, shared with other devices on it.
-        takes_planes: Whether frames are fastest to send as planes (core.frames.frame_source), in r32ui textures.
-        ask_others: Called when the budget is full; makes other devices free memory. None: there are none.
+        budget: The memory of all textures on this GPU, shared with other devices on the same GPU.
+        takes_planes: Whether frames are sent fastest as planes of luma and chroma (frame_source.Planes), in r32ui
+            textures, rather than as RGBA.
+        ask_others: Called when the budget is full, so that other devices on this GPU free memory. None: no other device
+            shares the budget.
     """
 
     name: str
@@ -163,14 +169,14 @@ class Device:
         raise NotImplementedError
 
     def texture(self, width: int, height: int, layers: int, kind: str) -> Texture:
-        """Return a new texture array of undefined content.
+        """Return a new texture array of undefined content. Free other memory if necessary.
 
         Args:
             width: In texels.
             height: In texels.
-            layers: Their number.
+            layers: The number of layers.
             kind: A GLSL format: rgba8, rgba16, rgba16f, rgba16ui, rgba32ui, rgba32f, r32f or r32ui. Passes read rgba8
-                and rgba16 as 0 … 1, and nothing with filtering.
+                and rgba16 as floats from 0 to 1. Texels are never filtered.
 
         Raises:
             NoDeviceError: The device has no room for it.
@@ -181,28 +187,31 @@ class Device:
         return texture
 
     def write(self, texture: Texture, array: np.ndarray, layer: int = 0, *, opaque: bool = False) -> None:
-        """Fill a layer of a texture, or its first rows.
+        """Copy an array into the first rows of one layer of a texture. Other rows stay as they are.
 
         Args:
             texture: The texture.
-            array: (rows, width[, components]), C-contiguous, in the format's type.
-            layer: The layer's number.
-            opaque: Whether every alpha is full, so that the device may send only the colors.
+            array: (rows, width[, components]), C-contiguous, in the NumPy type of the texture's format. It may have
+                fewer rows than the texture.
+            layer: The index of the layer.
+            opaque: Whether alpha is full in all pixels. A device may then send only the colors, which is faster.
 
         Raises:
-            KeyError: Only passes write and read this format (rgba16ui and rgba32ui on Blender's GPU).
+            KeyError: The device cannot copy to or from this format, which only passes read and write (rgba16ui and
+                rgba32ui on Blender's GPU).
         """
         raise NotImplementedError
 
     def send(self, texture: Texture, frame: np.ndarray) -> Texture:
-        """Send an opaque 8-bit frame to the device, for the next pass.
+        """Send an opaque 8-bit frame to the device in the fastest way, for use by the next pass only.
 
         Args:
-            texture: An rgba8 texture of the frame's size, which may be used.
+            texture: An rgba8 texture of the frame's size, which the device may overwrite.
             frame: (rows, width, 4) uint8.
 
         Returns:
-            The texture for that pass: `texture`, or one of r32f with the numbers R + 256 G + 65536 B.
+            The texture for the pass to read: either `texture`, or a new one of format r32f, where each pixel is the
+            number R + 256 G + 65536 B.
         """
         self.write(texture, frame, opaque=True)
         return texture
@@ -226,18 +235,19 @@ class Device:
         blocks: Mapping[str, np.ndarray] | None = None,
         **constants: Any,
     ) -> None:
-        """Run a compute pass. Later passes read what it stored.
+        """Run a compute pass. Later passes and `read` see what it has stored.
 
         Args:
             program: The pass.
-            extent: The number of invocations (x, y[, z]).
-            textures: {name: texture} for its samplers.
-            images: {name: texture} for its images.
+            extent: The number of invocations (x, y[, z]), which is rounded up to whole workgroups.
+            textures: {name: texture} for its samplers. May contain others, which are ignored.
+            images: {name: texture} for its images. May contain others, which are ignored.
             blocks: {name: C-contiguous float32 array (length, 4)} for its uniform blocks.
             constants: {name: number or tuple of numbers} for its uniforms.
 
         Raises:
-            core.stopping.StoppedError: The picture is no longer wanted.
+            core.stopping.StoppedError: The calling thread's work was cancelled; the pass did not run.
+            NoDeviceError: The device has no room for all of its textures at once.
         """
         stopping.check()
         sampled = {name: (textures or {})[name] for name in program.samplers}
@@ -247,10 +257,13 @@ class Device:
         self._dispatch(program, program.groups(extent), *own, blocks or {}, constants)
 
     def use(self, release: Callable[[], None]) -> None:
-        """Mark a window as the one in use. If memory is short, the others are freed, the least recently used first.
+        """Mark a window (stored source frames of a picture) as the one in use, which the device does not free.
+
+        If memory is short, the other windows are freed, the least recently used first. They load their frames again
+        later.
 
         Args:
-            release: The function that frees the window.
+            release: The function that frees the window. The device knows the window by it.
         """
         self.forget(release)
         self._windows[release] = None
@@ -264,7 +277,10 @@ class Device:
         raise NotImplementedError
 
     def bring(self, textures: Iterable[Texture]) -> None:
-        """Bring the content of these textures to the device, where it is on the host.
+        """Move textures whose content is in main memory back to the device, so that all of these are there at once.
+
+        Args:
+            textures: The textures. Those of no device, or of another one, are ignored.
 
         Raises:
             NoDeviceError: The device has no room for all of them at once.
@@ -294,11 +310,14 @@ class Device:
         """Allocate a texture with the graphics library, within the budget. Free other memory if necessary.
 
         Args:
-            texture: Its size and format.
-            beside: Textures that must stay on the device.
+            texture: A texture without memory on the device, for its size and format.
+            beside: Textures that must not be moved to main memory for it.
+
+        Returns:
+            The texture object of the graphics library, which the caller stores in Texture.own.
 
         Raises:
-            NoDeviceError: There is no room.
+            NoDeviceError: It is larger than the device or the budget allows, or nothing more can be freed.
         """
         width, height, layers = texture.size
         possible = max(width, height) <= self.max_size and layers <= self.max_layers
@@ -315,13 +334,16 @@ class Device:
         )
 
     def _make_room(self, beside: tuple[Texture, ...]) -> bool:
-        """Free some memory: of other devices, else of a texture (moved to the host), else of a window not in use.
+        """Free some memory on the GPU, by the first of these steps that frees any.
+
+        Other devices on the GPU are asked (ask_others). Else the least recently used texture of a format in MOVABLE
+        moves to main memory. Else the least recently used window that is not in use is freed.
 
         Args:
             beside: Textures that must stay on the device.
 
         Returns:
-            False if there was nothing to free.
+            True if something was freed, False if nothing was left to free.
         """
         used = self.budget.used
         if self.ask_others is not None and used > sum(texture.bytes for texture in self._held):
@@ -354,31 +376,33 @@ class Device:
         raise NotImplementedError
 
     def _dispatch(self, program: Pass, groups: tuple[int, ...], textures: dict, images: dict, *given: Mapping) -> None:
-        """Run a pass with the graphics library.
+        """Bind the textures and arguments of a pass, and run it with the graphics library.
 
         Args:
             program: The pass.
             groups: The number of workgroups (x, y, z).
             textures: {name: texture object} for its samplers.
             images: {name: texture object} for its images.
-            given: Its uniform blocks and its constants, as for `run`.
+            given: Two mappings: `blocks` and `constants`, as for `run`.
         """
         raise NotImplementedError
 
 
 class NamedTextures:
-    """Textures that are kept by name from picture to picture. A texture is made again when its size changes."""
+    """Textures that are reused from picture to picture, each known by a name."""
 
     def __init__(self, device: Device) -> None:
         self.device = device
         self._kept: dict[str, Texture] = {}
 
     def of(self, name: str, size: tuple[int, int, int], kind: str = "rgba32f") -> Texture:
-        """Return the texture of a name. It is new, with undefined content, if there is none of this size.
+        """Return the texture that has a name, with its content from earlier uses.
+
+        If there is none, or it has another size, it is freed, and a new one with undefined content is made.
 
         Args:
-            name: The name.
-            size: (width, height, layers).
+            name: The name, which the caller chooses.
+            size: (width, height, layers) in texels.
             kind: The GLSL format, always the same for a name.
         """
         texture = self._kept.get(name)
@@ -389,11 +413,12 @@ class NamedTextures:
         return texture
 
     def filled(self, name: str, layers: Sequence[np.ndarray] | np.ndarray, kind: str = "rgba32f") -> Texture:
-        """Return the texture of a name, filled with arrays.
+        """Return the texture that has a name, as `of` does, after copying arrays into its layers.
 
         Args:
-            name: The name.
-            layers: An array (height, width[, components]) for each layer, in the format's type.
+            name: The name, which the caller chooses.
+            layers: An array (height, width[, components]) for each layer, of the format's NumPy type. All have the same
+                size.
             kind: The GLSL format, always the same for a name.
         """
         height, width = layers[0].shape[:2]

@@ -37,9 +37,9 @@ _FREE_MEMORY = 0x87FC
 
 @contextmanager
 def _kept_context() -> Iterator[None]:
-    """Restore the thread's current OpenGL context when the `with` block ends.
+    """Make this thread's current OpenGL context current again when the `with` block ends. Does nothing except on Linux.
 
-    On EGL, moderngl leaves the thread without one. Elsewhere this does nothing.
+    There (EGL) moderngl would leave the thread without a current context, even if it had Blender's.
     """
     if not _EGL:
         yield
@@ -66,12 +66,16 @@ def _egl() -> ctypes.CDLL:
 
 @cache
 def _gl(name: str) -> Callable[..., Any]:
-    """Return an OpenGL function that has no result, for calls during which other Python threads can run.
+    """Return an OpenGL function to call through ctypes, such as "glFinish". It must have no result.
 
-    ctypes releases Python's lock for a call, and moderngl does not.
+    Other Python threads run during its calls, since ctypes releases Python's global lock; moderngl does not.
+
+    Args:
+        name: The name of the function.
 
     Raises:
-        NoDeviceError: There is no such function.
+        NoDeviceError: On Linux: the driver has no such function.
+        AttributeError: On Windows: the function is not in opengl32.dll, which has only those of OpenGL 1.1.
     """
     if sys.platform == "win32":
         return getattr(ctypes.windll.opengl32, name)  # this DLL has only those of OpenGL 1.1
@@ -83,10 +87,14 @@ def _gl(name: str) -> Callable[..., Any]:
 
 
 def _memory(context: moderngl.Context, renderer: str) -> int | None:
-    """Return the bytes of memory of the current context's GPU, or None if the driver does not tell.
+    """Return the memory of the GPU of an OpenGL context in bytes, or None if it is unknown.
 
-    For llvmpipe, this is the machine's main memory. If only the free memory is known, it is rounded down to a power of
-    two, to be the same at the next start.
+    llvmpipe has the machine's main memory. If the driver tells only the free memory, the result is that, rounded down
+    to a power of two, so that it is likely to be the same at the next start.
+
+    Args:
+        context: The current context of this thread.
+        renderer: The renderer's name, as the driver tells it.
     """
     if is_llvmpipe(renderer):
         return machine_memory()
@@ -100,13 +108,14 @@ def _memory(context: moderngl.Context, renderer: str) -> int | None:
 
 
 class GLDevice(Device):
-    """A device on a new OpenGL 4.3 context.
+    """A device on a new OpenGL 4.3 context without a window.
 
-    Do not use it on a thread with a current GLX context, such as Blender's main thread on X11: EGL does not replace
-    that context, which would get the calls.
+    Do not use it on a thread that has a current GLX context, such as Blender's main thread on X11: EGL does not replace
+    that context, and OpenGL calls would go to it.
 
     Args:
-        budget: The memory that it shares with other devices on the GPU. None: one of its own (`allowed`).
+        budget: The memory that textures may take, shared with other devices on the same GPU. None: a new budget of its
+            own (`allowed`).
         ask_others: As for Device.
 
     Raises:

@@ -13,22 +13,24 @@ MOST_BYTES = 1 << 30
 
 
 def is_llvmpipe(renderer: str) -> bool:
-    """Return whether a renderer's name, as the driver tells it, is that of llvmpipe.
+    """Return whether a renderer is llvmpipe, which renders on the CPU, in main memory, with textures stored row by row.
 
-    It uses the machine's memory, and stores textures row by row.
+    Args:
+        renderer: The renderer's name, as the driver tells it.
     """
     return "llvmpipe" in renderer
 
 
 def frames_iterations(values: np.ndarray, span: tuple[int, int]) -> int:
-    """Return the most loop iterations that an invocation of the pass compose_frames can take, for any coefficients.
+    """Return an upper limit of the loop iterations that one invocation of compose_frames takes.
 
-    llvmpipe ends loops after 65,535 without an error. Each piece (a row of the table) counts for every frame from the
-    one in which it may begin to the one in which it and all before it have ended.
+    The limit holds for any coefficients of its pixels. It shows whether the shader can run on llvmpipe, which ends all
+    loops of an invocation after 65,535 iterations without an error. Each piece (a row of the table) counts once for
+    each frame from the one in which it may begin to the one in which it and all before it have ended, in any pixel.
 
     Args:
-        values: The table of shutters (composition_passes.table).
-        span: FrameState.open_span.
+        values: The table of shutters by displacement (composition_passes.table).
+        span: FrameState.open_span: the first exposed frame of the window and one past the last.
     """
     groups = values.shape[1] // 2
     start, end, apart = values[1:, :groups], values[1:, groups:-1], values[1:, -1, 1]
@@ -39,14 +41,14 @@ def frames_iterations(values: np.ndarray, span: tuple[int, int]) -> int:
 
 
 def median_iterations(rows: int, frames: int, kind: str) -> int:
-    """Return how many loop iterations the pass compose_search takes for a median, in an invocation.
+    """Return how many loop iterations one invocation of the shader compose_search takes to make a median.
 
-    shaders/include/combine.glsl has the loops.
+    It shows whether the shader can run on llvmpipe. The loops are in shaders/include/combine.glsl.
 
     Args:
-        rows: The number of pieces in the table of shutters.
-        frames: The number of frames.
-        kind: The format of the frames' textures.
+        rows: The number of pieces (rows after row 0) in the table of shutters.
+        frames: The number of frames of the window that are exposed.
+        kind: The GLSL format of the textures with the frames.
     """
     scans = 5 if kind == "rgba8" else 10
     return scans * frames * (1 + 4 * (1 + rows.bit_length()))

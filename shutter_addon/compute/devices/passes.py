@@ -41,21 +41,21 @@ class Image:
 
 @dataclass(eq=False)
 class Pass:
-    """A compute, vertex or fragment shader, with the names and types of what it binds. `read_pass` makes it.
+    """A compute, vertex or fragment shader, with the names and types of what it binds. Made by `read_pass`.
 
     Attributes:
-        file: Its file in shaders/, without .glsl.
-        step: Its step there; "" if the file has only one.
+        file: The name of its file in shaders/, without .glsl.
+        step: The macro that selects its part of the file; "" if the file has only one.
         defines: {name: value} of its other macros.
-        source: The whole compute shader in GLSL 4.3.
-        body: The source without macros and declarations, which Blender's `gpu` module adds.
+        source: The complete GLSL source, version 4.3.
+        body: The source without macros and declarations, as Blender's `gpu` module adds these.
         samplers: {name: GLSL type}.
         images: {name: Image}.
         constants: {name: GLSL type} of its uniforms.
-        blocks: {name: length} of its uniform blocks, each an array of vec4.
-        ins: {name: GLSL type} of the inputs of a vertex or fragment shader.
-        outs: {name: GLSL type} of its outputs.
-        local_size: Invocations of a workgroup (x, y, z).
+        blocks: {name: length} of its uniform blocks, each an array of that many vec4.
+        ins: {name: GLSL type} of the inputs of a vertex or fragment shader; empty for a compute shader.
+        outs: {name: GLSL type} of its outputs; empty for a compute shader.
+        local_size: The invocations of a workgroup (x, y, z).
     """
 
     file: str
@@ -78,12 +78,15 @@ class Pass:
 
 @cache
 def read_pass(file: str, step: str = "", **defines: int | str) -> Pass:
-    """Return a pass from shaders/. It is the same object for the same arguments.
+    """Read a pass from shaders/. The result is kept: the same arguments return the same object.
 
     Args:
         file: The file's name, without .glsl.
-        step: The step in the file; "" if it has only one.
-        defines: {name: value} of macros.
+        step: The macro that selects a part of the file (#ifdef STEP); "" if the file has only one.
+        defines: {name: value} of further macros, inserted as #define. Macros in conditions without a value are 0.
+
+    Raises:
+        ValueError: The file has a directive or condition that is not supported (see the module).
     """
     program = Pass(file, step, defines)
     source, body = [], []
@@ -100,10 +103,15 @@ def read_pass(file: str, step: str = "", **defines: int | str) -> Pass:
 
 
 def _declared(program: Pass, line: str) -> str:
-    """Note in a pass what a line of GLSL declares, such as images and uniforms.
+    """Add what a line of GLSL declares (workgroup size, samplers, images, uniforms, inputs or outputs) to a pass.
+
+    Args:
+        program: The pass, which is modified.
+        line: The line, without its comment.
 
     Returns:
-        The line, with binding points where it needs them; "" if it declares nothing.
+        The declaration, with binding points for samplers, images and uniform blocks; "" if the line declares none of
+        these.
     """
     defines, samplers, images = program.defines, len(program.samplers), len(program.images)
     if found := _LOCAL_SIZE.fullmatch(line):
@@ -131,9 +139,17 @@ def _declared(program: Pass, line: str) -> str:
 
 
 def _live(path: Path, macros: Mapping[str, int | str]) -> Iterator[str]:
-    """Yield the lines of a shader file that count for some macros, with #line directives for the compiler's errors.
+    """Yield the lines of a shader file, with conditions and #include resolved for some macros.
 
-    Lines whose conditions do not hold become blank, and files that are included are put in place.
+    Directives and lines whose conditions do not hold become blank, and included files are inserted. A #line directive
+    at the start and after each included file keeps line numbers right in the compiler's errors.
+
+    Args:
+        path: The shader file.
+        macros: {name: value} of the macros; others are 0.
+
+    Raises:
+        ValueError: A directive or a condition is not supported.
     """
     yield "#line 1"
     around = [(True, True)]  # of the conditions around a line: whether its lines count, and no later branch can

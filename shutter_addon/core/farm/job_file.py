@@ -65,7 +65,13 @@ class JobError(UserError, ValueError):
 
 
 def write(folder: Path, version: EditVersion) -> None:
-    """Write the job file for an edit's version into the folder of the pictures, whole or not at all.
+    """Write the job file that names an edit's version into the folder of the rendered pictures, whole or not at all.
+
+    A job file that is there already is replaced.
+
+    Args:
+        folder: The folder of the rendered pictures.
+        version: The version of the edit that they are rendered from.
 
     Raises:
         OSError: It cannot be written.
@@ -75,15 +81,17 @@ def write(folder: Path, version: EditVersion) -> None:
 
 
 def guard(folder: Path, here: EditVersion) -> None:
-    """Check that a folder's job file, if there is one, names the version of the edit that this machine has.
+    """Check that a folder's job file names the version of the edit that this machine has.
+
+    So machines that render into one folder cannot mix pictures of different edits. A folder without a job file passes.
 
     Args:
-        folder: The folder of the pictures.
-        here: The version on this machine.
+        folder: The folder of the rendered pictures.
+        here: The version of the edit on this machine.
 
     Raises:
-        JobError: It names another version, or is damaged.
-        OSError: It cannot be read.
+        JobError: The job file names another version, or is damaged.
+        OSError: The job file exists, but cannot be read.
     """
     path = folder / NAME
     try:

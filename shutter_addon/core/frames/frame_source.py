@@ -27,14 +27,16 @@ _MATRICES = {1: (117489, 138438, 13975, 34925), 2: _BT601, 5: _BT601, 6: _BT601}
 
 @dataclass(frozen=True)
 class Matrix:
-    """The whole numbers with which 8-bit samples of luma and chroma are converted to RGB, as in libswscale.
+    """The whole numbers with which 8-bit samples of luma and chroma are converted to 8-bit RGB, as in libswscale.
 
-    Factors are in units of 1/8192.
+    Red is (Y − offset / 512) · luma + (Cr − 128) · red_of_cr, in 1/8192, rounded and clipped to 0 … 255. Blue is the
+    same with Cb and blue_of_cb. Green has both chroma terms.
 
     Attributes:
-        offset: What is subtracted from luma, in 1/512 of a level.
-        luma: The factor of luma for all three colors.
-        red_of_cr, green_of_cb, green_of_cr, blue_of_cb: The factors of chroma (less 128), which are added.
+        offset: The luma of black, times 512: 16 · 512 for samples of limited range, 0 for full range.
+        luma: The factor of luma for all three colors, times 8192.
+        red_of_cr, green_of_cb, green_of_cr, blue_of_cb: The factors of chroma, times 8192: what Cb − 128 or Cr − 128
+            adds to a color. Those of green are negative.
     """
 
     offset: int
@@ -46,11 +48,15 @@ class Matrix:
 
 
 def matrix(space: int, full: bool) -> Matrix | None:
-    """Return the conversion from samples to RGB for a color space, or None if that is neither BT.601 nor BT.709.
+    """Return the conversion from 8-bit luma and chroma to RGB for a color space.
 
     Args:
-        space: Its matrix coefficients as a number of ITU-T H.273; 2: unspecified, which counts as BT.601.
-        full: Whether samples have the full range 0 … 255 instead of 16 … 235.
+        space: The number of the matrix coefficients in ITU-T H.273, as files store it. 1: BT.709; 5 and 6: BT.601;
+            2: unspecified, which counts as BT.601.
+        full: Whether luma has the full range 0 … 255 instead of 16 … 235.
+
+    Returns:
+        The conversion, or None for any other `space`.
     """
     if space not in _MATRICES:
         return None
@@ -84,9 +90,9 @@ class Planes:
 
     Attributes:
         luma: uint8 (H, W), top row first.
-        chroma: Cb and Cr, uint8 (⌈H/2⌉, ⌈W/2⌉) each.
-        matrix: How they are converted to RGB.
-        rgba: Returns the converted frame, as FrameSource.read does.
+        chroma: Cb and Cr in this order, uint8 (⌈H/2⌉, ⌈W/2⌉) each.
+        matrix: The numbers for converting luma and chroma to RGB.
+        rgba: A function that converts the frame on the CPU: RGBA (H, W, 4), as FrameSource.read returns it.
     """
 
     luma: np.ndarray
@@ -132,43 +138,54 @@ class Pair(Protocol):
         """Return a copy that makes moments between two other frames (H, W, 4), by the same optical flow."""
 
     def moment(self, pair: tuple[int, int], number: int, steps: int) -> np.ndarray | Moment:
-        """Return a moment, a frame between the two in time, or the nearer one (H, W, 4) if they have nothing in common.
+        """Return a moment: a frame at a time between the pair's two frames, which is not computed yet.
 
         Args:
-            pair: The numbers of the frames, for Moment.pair.
-            number: Which moment, 1 to steps − 1.
-            steps: Into how many steps the time between the frames is divided.
+            pair: The numbers of the two frames. They are only stored in Moment.pair.
+            number: Which moment, 1 to steps − 1. It lies number / steps of the way from the first to the second frame.
+            steps: Into how many equal steps the time between the two frames is divided.
+
+        Returns:
+            The moment. If the two frames are equal or have nothing in common, as at a cut: the one that is nearer in
+            time (H, W, 4), halfway the first.
         """
 
     def rgba(self, moment: Moment) -> np.ndarray:
         """Make the frame (H, W, 4) of a moment, as FrameSource.read gives it."""
 
     def values(self, moment: Moment, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """Return values of pixels, such as a matte's, at a moment: float32 (H, W), moved by the frames' optical flow.
+        """Interpolate values of pixels, such as a matte's, to a moment: move them along the frames' optical flow.
 
         Args:
-            moment: The moment.
-            first, second: The values (H, W) in the first and the second frame.
+            moment: The moment, from `moment`.
+            first, second: The values, float32 (H, W), at the pair's first and second frame.
+
+        Returns:
+            The values at the moment, float32 (H, W): a mix of `first` and `second`.
         """
 
 
 @dataclass(frozen=True)
 class Moment:
-    """What a frame at a time between two filmed frames is made from. A GPU or `rgba` makes it.
+    """A frame at a time between two filmed frames, as the data from which a GPU or `rgba` computes its pixels.
 
-    Both frames are looked up along paths at key moments, equally far apart in time; other moments are mixes of the two
-    key moments around them, in linear light. A part of the picture that moves less has fewer key moments.
+    The time between the two frames is divided into `keys` equal parts. Their bounds are key moments: number 0 is the
+    first frame, number `keys` the second. At a key moment between them, each pixel is a mix of two pixels, one of each
+    frame, at the ends of the motion path (from optical flow) that passes there. Any other time is a mix of the key
+    moments before and after it, in linear light. Parts of the picture that move little use only some key moments.
 
     Attributes:
-        pair: Numbers of the two frames among filmed ones: neighbours, unless those between repeat the first.
-        ends: The two frames (H, W, 4), of a FrameSource's type.
-        number, steps: It lies number / steps of the way from the first frame to the second.
-        vectors: uint16 (keys − 1, ⌈H / STEP⌉, ⌈W / STEP⌉, 4), shared by the moments of a pair; keys is a power of two.
-            The key moment k, of 1 … keys − 1, has vectors[k − 1], for every STEPth pixel: x and y of the path from the
-            first frame to the second that passes there, in 1 / UNIT of a pixel from ZERO; and how surely the first and
-            the second frame show what follows it, 0 to 255. Between these pixels they are bilinear.
-        levels: uint8, one for each tile of TILE pixels, shared by the pair: its key moments are keys / 2^level apart.
-        between: What makes the moments of the pair.
+        pair: The numbers of the two frames, counting filmed frames only. They are neighbors, unless the frames between
+            them only repeat the first.
+        ends: The two frames, RGBA (H, W, 4) each, in the source's dtype.
+        number, steps: The time: number / steps of the way from the first frame to the second.
+        vectors: uint16 (keys − 1, ⌈H / STEP⌉, ⌈W / STEP⌉, 4), the same for all moments of a pair; `keys` is a power of
+            two. vectors[k − 1] is for key moment k, at every STEPth pixel; interpolate bilinearly between these.
+            Channels 0 and 1: x and y of the whole path from the first frame to the second, in 1 / UNIT of a pixel, plus
+            ZERO. Channels 2 and 3: how surely the first and the second frame show what moves there, 0 to 255.
+        levels: uint8, one for each tile of TILE pixels (rows, columns of tiles), the same for all moments of a pair. A
+            tile of level n uses 2ⁿ + 1 key moments, those whose number is a multiple of keys / 2ⁿ.
+        between: The Pair that made this moment.
     """
 
     pair: tuple[int, int]
@@ -198,19 +215,20 @@ def as_rgba(frame: Decoded) -> np.ndarray:
 
 
 class ShotFinder(Protocol):
-    """Finds the cuts of a source (media/cuts.py). Frames are numbered from 0.
+    """Finds the cuts of a source (media/cuts.py). Frames are numbered from 0, including moments between filmed ones.
 
-    It may read frames. It keeps them until the source's `read` asks for them, so that no frame is decoded twice.
+    To find cuts it reads frames of the source. It keeps these in memory, within a limit, until the source's `read` asks
+    for them, so that they are not decoded twice.
     """
 
     def around(self, index: int, low: int, high: int, *, known: bool = False) -> range:
-        """Return the frames of the shot to which a frame belongs: those between the cuts around it.
+        """Return the frames of the shot to which a frame belongs: those between the cuts before and after it.
 
         Args:
-            index: The frame.
-            low, high: The first and last frame that matter. Cuts beyond are not searched: the range then goes to the
-                clip's start or end.
-            known: Read nothing, and assume that there is no cut where nothing is known.
+            index: The number of the frame.
+            low, high: The first and last frame between which cuts are searched. On a side where none is found, the
+                result extends to the clip's start or end.
+            known: Use only cuts that earlier calls found, and read no frames.
         """
 
     def lacking(self, index: int, low: int, high: int) -> set[int]:
@@ -230,21 +248,23 @@ class FrameSource(ABC):
         path: The movie, or the first file of the sequence.
         file_kind: Format, codec and samples of the file, as the libraries name them.
         files: The movie, or the file of each frame.
-        width, height: In pixels.
-        count: The number of frames, as Blender's strip counts them (content_duration).
-        fps: Frames per second; None for an image sequence.
-        dtype: The type of samples: uint8, uint16, float16 or float32; the range of integers stands for 0 … 1.
+        width, height: The size of the frames in pixels.
+        count: The number of frames, including moments; without these, as Blender counts them (content_duration).
+        fps: Frames per second, counting moments; None for an image sequence.
+        dtype: The type of samples: uint8, uint16, float16 or float32. 0 to the largest integer stands for 0 to 1.
         transfer: "srgb" (sRGB display values) or "linear" (scene linear, Rec.709 primaries).
         alpha: "opaque", "straight" or "premultiplied".
-        options: What samples depend on besides the files, {name: plain value}.
+        options: The settings that the samples depend on, besides the files, such as the color space: {name: value}.
         has_audio: Whether the file has sound.
-        left_out: A sentence for the user about files beside the sequence that do not belong to it, or "".
-        step: Every step-th frame was filmed, from the first on; the others are moments between them.
-        shots: What finds its cuts; None: it has none.
-        from_proxy: Whether frames come from a proxy where it has them.
-        by_blender: Whether a second Blender decodes them because PyAV is missing.
-        repeats: Whether repeated frames were found and replaced by moments.
-        windows: How many windows of one picture read this source, each of which needs memory for it.
+        left_out: A sentence that warns the user of later numbered files which are not part of the sequence, because too
+            many numbers are missing before them. "": there are none.
+        step: Frames 0, step, 2 · step … were filmed. The others are moments, computed between them. 1: all were filmed.
+        shots: Finds the source's cuts. None: the source counts as one shot.
+        from_proxy: Whether frames come from a proxy (a small copy made by Blender), except those that it lacks.
+        by_blender: Whether a second Blender process decodes the frames because PyAV is missing.
+        repeats: Whether any frame that repeats the one before was replaced by a moment so far.
+        windows: How many windows (buffers of frames on the device) a picture needs at once for this source. Their
+            memory is budgeted accordingly.
     """
 
     path: Path
@@ -269,7 +289,10 @@ class FrameSource(ABC):
 
     @abstractmethod
     def read(self, index: int) -> np.ndarray:
-        """Return a frame as an array (height, width, 4), RGBA, top row first. Ascending order is fastest.
+        """Return a frame as an array (height, width, 4), RGBA, top row first. Reading in ascending order is fastest.
+
+        Args:
+            index: The number of the frame, from 0, counting moments.
 
         Raises:
             MediaError: The frame cannot be decoded.
@@ -277,7 +300,13 @@ class FrameSource(ABC):
         """
 
     def decoded(self, index: int) -> Decoded:
-        """Return a frame in the form that is fastest to get, which may be planes or a moment, or as `read` does.
+        """Return a frame in the form that is fastest to get.
+
+        Args:
+            index: As for `read`.
+
+        Returns:
+            A Planes, a Moment, or an array as from `read`. `as_rgba` converts any of them to such an array.
 
         Raises:
             MediaError, IndexError: As for `read`.
@@ -300,10 +329,10 @@ class FrameSource(ABC):
 
 
 class SourceFile(Hashable, Protocol):
-    """The name of a source of frames, such as a matte file, which can be opened. Equal ones give the same frames.
+    """A file of frames, such as a matte file, that is named but not open yet. Equal ones give the same frames.
 
-    Frames of a matte are values (height, width) float32, 0 to 1, and `read` takes any index: it clamps the index to the
-    file's frames.
+    The opened source of a matte differs from other sources: `read` returns one value per pixel, (height, width)
+    float32, 0 to 1, and takes any index, which it clamps to the file's frames.
     """
 
     def open(self) -> FrameSource:
@@ -332,8 +361,8 @@ class SourceWrapper(FrameSource):
 
         Args:
             source: The other source.
-            frames: Returns the frame of an index; `read` and `decoded` then use it. None: both return what the source's
-                `read` returns.
+            frames: A function that returns the frame of an index, for `read` and `decoded`. None: `read` and `decoded`
+                both return what the other source's `read` returns.
         """
         self._source, self._frames_of = source, frames
 

@@ -34,14 +34,17 @@ def premultiplied(rgba: np.ndarray, convert: Callable[[np.ndarray], np.ndarray] 
 
 
 def over_black(frame: np.ndarray, alpha: str) -> np.ndarray:
-    """Return a source's frame (…, 4) as it looks over black: RGBA code values, with straight alpha premultiplied.
+    """Return a source's frame as it looks over black: straight alpha is multiplied into the colors.
+
+    The encoding stays: values are not converted to linear light first.
 
     Args:
-        frame: Samples as from FrameSource.read.
+        frame: RGBA (…, 4) as from FrameSource.read.
         alpha: FrameSource.alpha: "opaque", "straight" or "premultiplied".
 
     Returns:
-        float32, 0 … 1, if samples are floats or alpha is straight. Other integers stay as they are.
+        RGBA (…, 4). Floats become float32, clipped to 0 … 1, with 0 for NaN. Integers with straight alpha become
+        float32, 0 … 1. Other integers are returned as they are.
     """
     if frame.dtype.kind == "f":
         frame = np.nan_to_num(frame.astype(np.float32), copy=False).clip(0, 1)

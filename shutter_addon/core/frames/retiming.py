@@ -9,12 +9,13 @@ import numpy as np
 
 @dataclass(frozen=True)
 class RetimingKey:
-    """A retiming key of a strip, as Blender stores it.
+    """A retiming key of a strip, as Blender stores it: which place of the content is shown at which time.
 
     Attributes:
-        index: Its position in frames of the content before retiming.
-        flag: Bits of eSeqRetimingKeyFlag; the first one begins a smooth transition between two speeds.
-        factor: The position in the content that is shown there, 0 to 1.
+        index: The time of the key: timeline frames since StripTiming.content_start, times the `playback_rate`.
+        flag: Bits of Blender's eSeqRetimingKeyFlag. If the lowest bit is set, a smooth transition between two speeds
+            begins here and ends at the next key.
+        factor: The place that is shown at this time, from 0, the content's start, to 1, its end.
     """
 
     index: float
@@ -24,15 +25,20 @@ class RetimingKey:
 
 @dataclass(frozen=True)
 class StripTiming:
-    """The timing of a strip that shows footage. Fields that are not explained here are those of Blender's strips.
+    """The timing of a strip of Blender's sequencer that shows footage. The content is the footage's part that it plays.
 
     Attributes:
-        name: The strip's.
-        first: How many of the footage's frames come before the content: *Frame Offset* of a movie clip, else 0.
+        name: The strip's name.
+        first: How many frames of the footage come before the content: *Frame Offset* of a movie clip, else 0.
         scene_fps: Frames per second of the edit.
-        strobe: Only every n-th frame of the content is shown, and held; 1: all are.
-        keys: The retiming keys, finite and in order.
-        is_known: Whether the keys could be read; otherwise constant speed is assumed.
+        content_start, content_end: The timeline frame of the content's first frame, and one past its last, whether the
+            strip's handles hide them or not.
+        content_trim_start, content_trim_end: How many frames are cut off before and after the content, besides `first`.
+        left_handle: The first timeline frame at which the strip is visible.
+        use_reverse_frames: Whether the content plays backward.
+        strobe: Only every strobe-th frame of the content is shown, and stays until the next one is; 1: all are shown.
+        keys: The retiming keys, all finite, by ascending index; fewer than two: there is no retiming.
+        is_known: Whether Blender's retiming keys could be read. If not, a constant speed is assumed.
     """
 
     name: str
@@ -55,13 +61,17 @@ class StripTiming:
 
 
 def position(strip: StripTiming, rate: float, length: int, frame: float) -> np.float32:
-    """Return which position in a strip's content a timeline frame shows, in frames from 0, in float32 like Blender.
+    """Return which position in a strip's content a timeline frame shows, computed in float32 like Blender.
 
     Args:
         strip: The strip.
-        rate: From `playback_rate`.
+        rate: Frames of the content per timeline frame before retiming, from `playback_rate`.
         length: The number of frames of the content.
         frame: The timeline frame.
+
+    Returns:
+        The position in frames of the content, 0 to length − 1, with a fraction. Timeline frames outside the content get
+        its first or last frame. With a strobe, the position is rounded down to a multiple of the strobe.
     """
     end = strip.content_end - 1
     position = np.float32(max(end - frame if strip.use_reverse_frames else frame - strip.content_start, 0.0))
@@ -77,13 +87,13 @@ def position(strip: StripTiming, rate: float, length: int, frame: float) -> np.f
 def playback_rate(strip: StripTiming, length: int, fps: float) -> float:
     """Return how many frames of a strip's content pass in a timeline frame, before retiming.
 
-    That is the movie's rate / the scene's if the strip was imported to keep the movie's speed, else 1. Blender's API
-    does not tell which. The strip's length does.
+    A strip can be imported so that it keeps the movie's speed: the rate is then fps / the scene's fps. Otherwise it is
+    1. Blender's API does not tell which, so the one is chosen that agrees better with the strip's length.
 
     Args:
         strip: The strip.
         length: The number of frames of the content.
-        fps: The movie's frames per second; 0 for images.
+        fps: The movie's frames per second. 0, for images: the result is 1.
     """
     rate = fps / strip.scene_fps
     if rate <= 0:  # images
@@ -94,9 +104,17 @@ def playback_rate(strip: StripTiming, length: int, fps: float) -> float:
 
 
 def retimed(keys: Sequence[RetimingKey], position: float | np.float32) -> np.float32:
-    """Apply retiming keys: convert a position in frames, before retiming, to the position in the content, 0 to 1.
+    """Apply retiming keys: convert a time in a strip to the place of the content that is shown then.
 
-    It is linear between keys, and an arc where Blender makes a smooth transition between two speeds.
+    The place changes linearly between keys, and on an arc where Blender makes a smooth transition between two speeds.
+    Outside the keys, the speed between the two nearest ones continues.
+
+    Args:
+        keys: At least two, by ascending index.
+        position: The time, in the unit of RetimingKey.index.
+
+    Returns:
+        The place, in the unit of RetimingKey.factor, at most 1.
     """
     k = max((i for i, key in enumerate(keys[:-1]) if key.index <= position), default=0)
     first, second = keys[k], keys[k + 1]
@@ -118,9 +136,18 @@ def _speed(first: RetimingKey, second: RetimingKey) -> np.float32:
 def _arc(
     first: RetimingKey, speed_in: np.float32, second: RetimingKey, speed_out: np.float32, position: float | np.float32
 ) -> np.float32:
-    """Return the shown position on a smooth transition between two speeds.
+    """Return the place that is shown at a time within a smooth transition between two speeds.
 
-    It is the circle that leaves the first key with one slope and reaches the second key with the other.
+    Drawn over time, the place is an arc of the circle that leaves the first key with the slope `speed_in` and reaches
+    the second key with the slope `speed_out`.
+
+    Args:
+        first, second: The keys at which the transition begins and ends.
+        speed_in, speed_out: The speeds before and after it, in RetimingKey.factor per RetimingKey.index. They differ.
+        position: The time, in the unit of RetimingKey.index.
+
+    Returns:
+        The place, in the unit of RetimingKey.factor.
     """
     # Its centre is on both normals, where x + slope·y is the same as at the key.
     slopes = np.array([[1.0, speed_in], [1.0, speed_out]])

@@ -24,7 +24,8 @@ class Shown(NamedTuple):
 
     Attributes:
         frame: The timeline frame, possibly between two whole ones.
-        source_frame: The frame of the footage, from 0. With Smooth, moments between filmed frames count as well.
+        source_frame: The number of the footage's frame, from 0. With Smooth, the numbers include the moments between
+            filmed frames.
         direction: 1, or −1 where the footage plays backward.
     """
 
@@ -38,12 +39,12 @@ class Clip:
     """The size, length and timing of an effect's footage.
 
     Attributes:
-        width, height: Of its pictures, in pixels.
-        count: The number of frames, including moments: frames that are made between filmed ones (Smooth).
-        step: Every step-th frame was filmed, from the first on; the others are moments.
-        fps: Frames per second; None for images.
+        width, height: The size of its pictures in pixels.
+        count: The number of frames, including moments: frames that are computed between filmed ones (Smooth).
+        step: Frames 0, step, 2 · step … were filmed; the others are moments. 1: all were filmed.
+        fps: Frames per second, including moments; None for images.
         timing: Which frame a timeline frame shows: the timing of a strip, or a channel of source time (Effect.time).
-            None: timeline frame 1 shows the first filmed frame, and so on, as in recipes.
+            None: timeline frame 1 shows the first filmed frame, frame 2 the second, and so on, as in recipes.
     """
 
     width: int
@@ -71,9 +72,17 @@ class Clip:
         return Shown(frame, nearest(filmed - 1, self.step, self.count), -1 if backward else 1)
 
     def position(self, frame: float) -> float:
-        """Return the place in the footage that a timeline frame shows, as a frame number from 0 that is not rounded.
+        """Return the place in the footage that a timeline frame shows, as a frame number with a fraction.
 
-        Strobe, which holds frames of a strip, is ignored. The position measures exposures that last a timeline frame.
+        It is used to measure how much of the footage plays during a timeline frame, for exposures that last that long.
+        So it ignores the strobe of a strip, which repeats frames.
+
+        Args:
+            frame: The timeline frame, possibly with a fraction.
+
+        Returns:
+            The frame number from 0, counting moments. With a strip it stays within `ends`; otherwise it can be outside
+            the footage.
         """
         if isinstance(self.timing, StripTiming):
             length, rate = self._content(self.timing)
@@ -83,9 +92,10 @@ class Clip:
 
     @property
     def ends(self) -> tuple[float, float]:
-        """The positions in the footage of the first and last frame of a strip's content, in frames (see `position`).
+        """The lowest and the highest value of `position`: the first and last frame of the content of a strip.
 
-        Beyond its ends the strip holds these frames. Without a strip the values are −∞ and ∞: no frame is held.
+        Before and after its content, a strip repeats these frames. If `timing` is no StripTiming, the values are −∞ and
+        ∞.
         """
         if isinstance(self.timing, StripTiming):
             first, (length, _rate) = self.timing.start, self._content(self.timing)
@@ -93,10 +103,11 @@ class Clip:
         return -math.inf, math.inf
 
     def _shown_by(self, strip: StripTiming, frame: float) -> int:
-        """Return the source frame that Blender shows for a strip at a timeline frame.
+        """Return the number, from 0, of the source frame that Blender shows for a strip at a timeline frame.
 
-        Trims, cuts, playback rate, retiming and strobe count as in Blender. If the clip has moments, which Blender does
-        not know, it is the nearest moment.
+        Trims, cuts, playback rate, retiming, reversal and strobe count as in Blender. Before and after its content, a
+        strip shows the content's first and last frame. If the clip has moments (`step` above 1), which Blender does not
+        know, the result is the frame nearest to the strip's position, which can be a moment.
         """
         length, rate = self._content(strip)
 
@@ -114,9 +125,11 @@ class Clip:
         return strip.start + min(index, length - 1)
 
     def _content(self, strip: StripTiming) -> tuple[int, float]:
-        """Return how many filmed frames a strip has after trimming, and how many pass per timeline frame.
+        """Return the length and the speed of a strip's content: the part of this footage that is not trimmed away.
 
-        The second number is the playback rate before retiming.
+        Returns:
+            The number of filmed frames in the content, at least 1, and how many of them pass per timeline frame before
+            retiming (retiming.playback_rate).
         """
         filmed = (self.count - 1) // self.step + 1
         length = max(1, filmed - strip.content_trim_start - strip.content_trim_end)
@@ -124,11 +137,11 @@ class Clip:
 
 
 def nearest(filmed: float, step: int, count: int) -> int:
-    """Return the number of the frame that is nearest to a time, from 0 to count − 1.
+    """Return the number, counting moments, of the frame that is nearest to a time in the footage.
 
     Args:
-        filmed: The time in filmed frames, from 0.
-        step: Frames per filmed frame (Clip.step).
-        count: The number of frames.
+        filmed: The time in filmed frames from 0, with a fraction: 1.5 lies halfway between the second and the third.
+        step: Clip.step.
+        count: Clip.count. The result is clamped to 0 … count − 1.
     """
     return min(max(math.floor(filmed * step + 0.5), 0), count - 1)

@@ -34,12 +34,12 @@ _TOO_MANY_POINTS = 'region "{name}": more than {most} points together with the r
 
 @dataclass(frozen=True)
 class Moves:
-    """The placement of a region or of the camera over time.
+    """How keys shift, turn and scale a region or the camera over time; the default leaves it as it was drawn.
 
     Attributes:
-        location: Channel of (x, y) in fractions of the picture, y up.
-        rotation: Channel of degrees, counter-clockwise.
-        scale: Channel of a factor; it acts about the centre, as rotation does.
+        location: Channel of the shift (x, y): x in fractions of the picture's width, y of its height, y up.
+        rotation: Channel of degrees, counter-clockwise, about the centre (Subject.centre).
+        scale: Channel of a factor, about the same centre.
     """
 
     location: Channel = field(default=keyframes.Constant((0.0, 0.0)))
@@ -48,10 +48,10 @@ class Moves:
 
     @staticmethod
     def keyed(keys: Sequence[tuple[float, Placement, keyframes.Ease]]) -> Moves:
-        """Return moves with keys, or still ones without any.
+        """Return moves made from keys; without keys, the default Moves, which do nothing.
 
         Args:
-            keys: (frame, placement, ease until the next key), by ascending frame.
+            keys: (frame, placement, ease from this key to the next), by ascending frame.
         """
         if not keys:
             return Moves()
@@ -74,8 +74,9 @@ class Subject:
     """Something whose motion a shutter can follow: a region, or the camera.
 
     Attributes:
-        moves: Its placement over time.
-        drawings: Strokes, about whose centre it turns and scales. None: it does so about the picture's centre.
+        moves: The subject's placement over time.
+        drawings: Strokes; the subject turns and scales about the centre of their bounding box. None: it turns and
+            scales about the picture's centre.
     """
 
     moves: Moves
@@ -86,12 +87,12 @@ class Subject:
         return self.moves.at(frame)
 
     def centre(self, frame: float) -> np.ndarray | None:
-        """Return the point (2,) about which the subject turns and scales, in fractions of the picture.
-
-        This is where it is drawn, before its keys move it. A subject without drawings has the picture's centre.
+        """Return the point about which the subject turns and scales at a frame.
 
         Returns:
-            The point, or None if there are no strokes at this frame.
+            The point (x, y) in fractions of the picture, y up: the centre of the bounding box of the strokes, before
+            keys move them. The picture's centre, if the subject has no drawings. None, if it has drawings, but no
+            strokes at this frame.
 
         Raises:
             EffectError: The strokes are too far outside the picture.
@@ -102,10 +103,11 @@ class Subject:
         return motions.centre(strokes) if strokes else None
 
     def corners(self, frame: float) -> np.ndarray:
-        """Return the corners (4, 2) of the box around the placed subject at a frame, in fractions of the picture.
+        """Return the corners of the bounding box of the strokes at a frame, after keys have moved them.
 
         Returns:
-            An array (0, 2) where nothing is drawn.
+            (4, 2), x and y in fractions of the picture, y up, counter-clockwise from the lower left. The corners of the
+            picture, if the subject has no drawings. (0, 2), if it has drawings, but no strokes at this frame.
 
         Raises:
             EffectError: The strokes are too far outside the picture.
@@ -125,9 +127,11 @@ class AnyRegion(Subject):
     """The base of all regions: a part of the picture that gets a shutter of its own.
 
     Attributes:
-        shutter: The shutter's index.
-        layer: Whether it is exposed by itself and laid over everything else (core/pixels/layering.py).
-        drawings: Its strokes; None for mattes and ramps.
+        name: The region's name.
+        shutter: The index of its shutter in Effect.shutters.
+        opacity: Channel of 0 to 1, how strongly the region acts.
+        layer: Whether the region is exposed by itself and laid over everything else (core/pixels/layering.py).
+        drawings: The region's strokes or curves; None for matte files, masks and ramps.
     """
 
     name: str = Labelled("Name", "Name of the region").fixed(default="Region", absent="", most=limits.MAX_NAME)
@@ -142,7 +146,13 @@ class AnyRegion(Subject):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Region(AnyRegion):
-    """A region of drawn strokes. The shutter is for what they cover (kind "line") or enclose ("lasso")."""
+    """A region of drawn strokes, which keys can move.
+
+    Attributes:
+        kind: Which pixels get the shutter: "line": those that the strokes cover; "lasso": those that they enclose.
+        width: Channel of the width of lines, as a fraction of the picture's height; not used for a lasso.
+        drawings: The strokes, at the frames where they are drawn.
+    """
 
     kind: str
     width: Channel = Labelled("Width", "Width of the lines as a fraction of the picture's height").number(
@@ -158,14 +168,15 @@ class Region(AnyRegion):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MatteRegion(AnyRegion):
-    """A region whose matte says how much of the shutter each pixel gets.
+    """A region whose matte says how much of the shutter each pixel gets, 0 to 1.
 
-    Keys place a ramp. Any other matte stays where it is; its keys only tell how the covered object moves, for exposures
-    that follow it. Rotation and scale are about the picture's centre.
+    `moves` shifts, turns and scales a ramp. Any other matte stays where it is: there, `moves` only describes how the
+    object under it moves, for shutters that follow the region. Without drawings, the centre is the picture's.
 
     Attributes:
-        content: Channel of mattes.Content. In an effect from a recipe: FileContent or RampContent.
-        blend, invert, feather, opacity: See mattes.Matte.
+        content: What gives the matte's values: a channel of mattes.Content. In an effect that was just read from a
+            recipe, it is no channel but a FileContent or RampContent.
+        blend, invert, feather, opacity: As in mattes.Matte; feather and opacity are channels.
     """
 
     content: Any
@@ -187,13 +198,14 @@ class MatteRegion(AnyRegion):
 class OutlineRegion(MatteRegion):
     """A region whose matte is the inside of closed curves.
 
-    Keys tell how the enclosed object moves, for exposures that follow it. They do not move the curves.
+    `moves` does not move the curves. It describes how the enclosed object moves, for shutters that follow the region.
 
     Attributes:
         drawings: The curves, at the frames where they are drawn.
-        between: How the matte changes from one drawing to the next: "carried" follows the footage, "straight" moves the
-            curves' points in straight lines.
-        content: Channel of mattes.FileFrame or mattes.Outline.
+        between: How the matte changes from one drawing to the next: "carried": it follows the motion in the footage;
+            "straight": the curves' points move in straight lines.
+        content: Channel of mattes.FileFrame (stored mattes) if "carried", of mattes.Outline if "straight". In an effect
+            that was just read from a recipe, the channel gives None.
     """
 
     drawings: Drawings
@@ -202,10 +214,13 @@ class OutlineRegion(MatteRegion):
     )
 
     def drawn_at(self, frame: float) -> scribbles.Shape:
-        """Return the curves at a frame as a lasso. A matte that follows the footage has them only where they are drawn.
+        """Return the curves at a frame as a shape of the kind "lasso".
+
+        The shape has no strokes if the matte follows the footage ("carried") and no curves were drawn at exactly this
+        frame. With "straight", curves between two drawings are interpolated.
 
         Raises:
-            EffectError: They are too far outside the picture.
+            EffectError: The curves are too far outside the picture.
         """
         has_curves = self.between == "straight" or frame in self.drawings.frames
         strokes = tuple(self.drawings.at(frame)) if has_curves else ()
@@ -214,15 +229,16 @@ class OutlineRegion(MatteRegion):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SubjectRegion(MatteRegion):
-    """A region whose matte is a subject (a person, an animal, a thing) that a model finds under strokes.
+    """A region whose matte is a subject (a person, an animal, a thing) that a segmentation model finds under strokes.
 
-    Its rotation and scale are about the centre of its strokes or, without strokes, of its outlines.
+    The region's rotation and scale are about the centre of `drawings` or, if there are none, of `outlines`.
 
     Attributes:
         drawings: Strokes on the subject.
         nots: Strokes on what is not the subject (*Not This*).
         outlines: Closed curves around the subject. They overrule the model.
-        content: Channel of mattes.FileFrame: the mattes that were found.
+        content: Channel of mattes.FileFrame: the stored mattes that were found. In an effect that was just read from a
+            recipe, the channel gives None.
     """
 
     drawings: Drawings
@@ -234,10 +250,12 @@ class SubjectRegion(MatteRegion):
         return self.drawings if self.drawings.frames else self.outlines
 
     def drawn_at(self, frame: float) -> scribbles.Shape:
-        """Return the strokes that were drawn at exactly this frame, as a shape of lines.
+        """Return the strokes on the subject that were drawn at exactly this frame, as a shape of the kind "line".
+
+        The shape has no strokes if none were drawn at this frame.
 
         Raises:
-            EffectError: They are too far outside the picture.
+            EffectError: The strokes are too far outside the picture.
         """
         strokes = tuple(self.drawings.at(frame)) if frame in self.drawings.frames else ()
         return scribbles.Shape(shutter=self.shutter, kind="line", width=0.0, strokes=strokes)
@@ -253,10 +271,12 @@ class FileContent:
     """A matte file as a recipe names it, before it becomes a channel of mattes.FileFrame.
 
     Attributes:
-        path: A movie, or the first file of an image sequence, relative to the recipe's folder.
-        channel: The channel of the file that is the matte.
-        offset: The matte's frame, from 0, that belongs to the first frame of the footage or of the timeline.
-        timing: Which of these two the matte follows.
+        path: A movie, a picture, or the first file of an image sequence, relative to the recipe's folder.
+        channel: What of the file is the matte: "luminance", "red", "green", "blue", "alpha", or the name of a channel
+            of an EXR file.
+        offset: The matte's frame, from 0, that is shown with the first frame of the footage or of the timeline.
+        timing: "source": the matte plays with the frames of the footage, however these are retimed; "timeline": it
+            plays one frame per timeline frame.
     """
 
     path: str
@@ -281,11 +301,11 @@ class RampContent:
 
 
 def placed_ramp(kind: mattes.RampKind, moves: Moves) -> Channel:
-    """Return a channel of mattes.Ramp that keys move.
+    """Return a channel of mattes.Ramp: a ramp that keys shift, turn and scale.
 
     Args:
-        kind: The ramp's shape.
-        moves: Where it lies at each frame.
+        kind: The ramp's shape: "linear", "radial" or "angle".
+        moves: The ramp's placement over time.
     """
 
     return keyframes.Computed(lambda frame: mattes.Ramp(kind, moves.at(frame)))
@@ -293,11 +313,13 @@ def placed_ramp(kind: mattes.RampKind, moves: Moves) -> Channel:
 
 @dataclass(frozen=True)
 class Camera(Subject):
-    """How the camera's view moves in the picture, about the picture's centre, so that shutters can follow it.
+    """How the filmed scene moves in the picture because the camera moved, so that shutters can follow that motion.
+
+    `drawings` is None: rotation and scale are about the picture's centre.
 
     Attributes:
-        influence: Channel of 0 to 1. Exposures that follow the camera are open for this share of their time, at 0 for
-            the shown frame only. How closely they follow stays the same.
+        influence: Channel of 0 to 1 by which exposures that follow the camera are shortened: 1 leaves their length, 0
+            leaves one frame: the shown one, or the exposed one nearest to it. How closely they follow stays the same.
     """
 
     influence: Channel = Labelled(
@@ -310,11 +332,22 @@ STILL_CAMERA = Camera(Moves())
 
 @dataclass(frozen=True, kw_only=True)
 class Shutter:
-    """A shutter over time: how much each frame contributes to a pixel, and how these frames are combined.
+    """A shutter over time: how much each frame of the window contributes to a pixel, and how they are combined.
 
     Attributes:
-        bars: The frames' contributions over time: a bar for each filmed frame of the window.
-        follow: The region or camera with which the exposure moves. None: it stays in its place.
+        bars: The contributions, which can change over time: a bar for each filmed frame of the window.
+        follow: The region or camera whose motion the exposure follows, so that this looks sharp. None: the exposure
+            looks at the same place in all frames.
+        follow_motion: Which parts of that motion are followed: "location"; "rotation", which includes location; or
+            "scale", which includes both.
+        follow_smooth: Frames before and after each frame over which the followed motion is averaged; 0: it is not.
+        length: What sets how long the exposure lasts. "frames": the bars. "timeline": one timeline frame. "motion", if
+            `follow` is not None: the time in which what is followed moves by `trail`. With the last two, the bars only
+            give the shape.
+        trail: Channel of a distance, as a fraction of the picture's height; used with the length "motion".
+        combine: "average", "lightest", "darkest" or "median" of the exposed frames.
+        by_luminance, use_threshold, threshold, softness: Only for "lightest" and "darkest", as in frame_state.Combine;
+            the last two are channels, used if `use_threshold` is true.
     """
 
     name: str = Labelled("Name", "Name of the shutter").fixed(default="Shutter", absent=MISSING, most=limits.MAX_NAME)
@@ -357,13 +390,14 @@ class Shutter:
         return self.follow is not None and self.length == "motion"
 
     def spread(self, steps: int, backward: bool = False) -> Callable[[np.ndarray], np.ndarray]:
-        """Return a function that turns bars of filmed frames (L,) into bars of moments (L · steps,).
+        """Return a function that spreads bars of filmed frames (L,) over bars of moments (L · steps,).
 
-        Moments are filmed frames, and those made between them.
+        Moments are filmed frames, and those that are computed between them. The function keeps the sum of the bars. It
+        is shutters.smoothed or, if bars only give the exposure's shape (`length`), shutters.held.
 
         Args:
-            steps: Moments per filmed frame.
-            backward: Whether the footage plays backward.
+            steps: Moments per filmed frame, 1 or an even number.
+            backward: Whether the footage plays backward. A filmed frame then is the last of its moments, not the first.
         """
         if self.length == "timeline" or self.has_trail:
             return partial(shutters.held, steps=steps)
@@ -373,28 +407,32 @@ class Shutter:
     def filmed(self, moments: ArrayLike, steps: int, position: str) -> shutters.Filmed:
         """Convert bars of moments, which recipes of version 1 have, into bars of filmed frames.
 
-        Moments are filmed frames, and those made between them.
+        Moments are filmed frames, and those that are computed between them.
 
         Args:
-            moments: (n,) bars.
+            moments: The old bars, (n,).
             steps: Moments per filmed frame.
-            position: Options.position.
+            position: Options.position, which tells at which end an incomplete window is filled up with zeros.
+
+        Returns:
+            The new bars, and which old bars they cannot reproduce, if any (shutters.Filmed).
         """
         return shutters.filmed(moments, steps, position, self.spread(steps))
 
     def lost(self, keys: Sequence[ArrayLike], steps: int, position: str, interpolation: str) -> EffectError | None:
-        """Return a warning if bars of filmed frames cannot expose what a recipe of version 1 did with bars of moments.
+        """Return a warning if a recipe of version 1 cannot be reproduced: its bars counted moments, not filmed frames.
 
-        Moments are filmed frames, and those made between them.
+        Moments are filmed frames, and those that are computed between them. `filmed` converts the bars.
 
         Args:
-            keys: The bars of moments at each key.
+            keys: The old bars of moments, (n,) at each key, in order of time.
             steps: Moments per filmed frame.
             position: Options.position.
-            interpolation: Options.interpolation. With "value", bars halfway between two keys are compared, too.
+            interpolation: Options.interpolation. With "value", bars halfway between two keys are checked, too.
 
         Returns:
-            A warning about the first difference, or None.
+            An error to show as a warning, about the first of these bars that would expose other moments than before.
+            None: all can be converted without a visible difference.
         """
         fading = [np.add(*pair) / 2 for pair in pairwise(keys)] if interpolation == "value" else []
         for moments in (*keys, *fading):
@@ -419,14 +457,14 @@ class Effect:
     """The whole effect, except for its footage.
 
     Attributes:
-        shutters: The first one is the default, which all pixels get if nothing is drawn.
-        regions: Later regions lie over earlier ones, and all mattes lie over all scribbles.
-        options: Channel of frame_state.Options. Its `edge_aware` does not count: that has a channel here.
-        time: Channel of (source frame, whether the footage runs backward); its first frame is 1. None: the strip's own
-            timing counts.
-        edge_aware: Channel of Options.edge_aware.
-        camera: A subject that shutters can follow.
-        lost: A warning that this recipe of an older version cannot look as it did, or None.
+        shutters: The first one is the default, which pixels get where no region gives them another.
+        regions: Later regions lie over earlier ones, and all mattes lie over all scribbles (regions of strokes).
+        options: Channel of frame_state.Options. Their `edge_aware` is ignored in favor of the channel below.
+        time: Channel of (source frame, whether the footage runs backward), where the footage's first frame is 1. None:
+            the timing of the strip tells which frame is shown.
+        edge_aware: Channel of 0 to 1, the value for Options.edge_aware.
+        camera: The camera's motion, which shutters can follow.
+        lost: A warning that a recipe of an older version cannot be reproduced exactly (Shutter.lost), or None.
     """
 
     shutters: tuple[Shutter, ...]
@@ -472,7 +510,10 @@ class Effect:
         return replace(self, shutters=shutters_, regions=tuple(regions))
 
     def for_picture(self, aspect: float) -> Effect:
-        """Return a recipe's effect for pictures of one aspect, which recipes do not know and rotated strokes need.
+        """Return the effect of a recipe with the aspect of the pictures, set in the drawings of all regions.
+
+        A recipe does not contain the aspect. It is needed to rotate strokes, as their points are fractions of width and
+        height.
 
         Args:
             aspect: The picture's width / height.
@@ -511,7 +552,11 @@ class Effect:
         return None
 
     def bars_at(self, index: int, frame: float) -> np.ndarray:
-        """Return the bars (L,) of the shutter with an index, at a frame.
+        """Return the bars of a shutter at a frame: (L,) float64, one for each filmed frame of the window.
+
+        Args:
+            index: The shutter's index in `shutters`.
+            frame: The frame, possibly between two whole ones.
 
         Raises:
             EffectError: No picture can be made of them (shutters.check_bars).
@@ -523,9 +568,9 @@ class Effect:
         """Check bars (L,) and return them as float64.
 
         Args:
-            index: The shutter's index, for the error's message.
-            frame: The frame of the bars, for the error's message.
-            bars: The bars.
+            index: The index of the shutter, whose name the error's message contains.
+            frame: The frame at which the shutter has these bars, also for the message.
+            bars: The bars to check.
 
         Raises:
             EffectError: No picture can be made of them (shutters.check_bars).

@@ -22,20 +22,26 @@ Choice = tuple[str, str, str]  # identifier, label, description
 
 @dataclasses.dataclass(frozen=True)
 class Field:
-    """A property of an effect, a shutter, a region or the camera: everything that its users derive from it.
+    """The declaration of a property of an effect, a shutter, a region or the camera.
+
+    Blender's properties, recipes, panels and documentation are derived from it.
 
     Attributes:
-        default: The value of a new effect in Blender.
-        absent: The value of a recipe without the field, or MISSING if recipes must have it.
-        least, most: The range of a number; `most` of a text is its number of characters.
-        soft_most: The largest value of the slider in Blender, below `most`. None: `most`.
-        choices: The allowed words. The model and recipes write them in small letters.
-        keyed, keyed_in_recipe: Whether F-curves and a recipe's keys can change it.
+        label, description: The name and the tooltip that users see.
+        default: The value in the model and in a new effect in Blender.
+        absent: The value if a recipe lacks the field. MISSING: a recipe without the field is invalid.
+        least, most: The range of a number. For a text, `most` is the largest number of characters.
+        soft_most: The upper end of the slider in Blender; larger values, up to `most`, can be typed. None: `most`.
+        choices: The allowed values of a choice; empty for other properties. The model and recipes write their
+            identifiers in small letters, or as numbers (see `words`).
+        keyed: Whether it can be animated in Blender, by F-curves.
         is_channel: Whether the model holds a keyframes.Channel instead of a plain value.
-        blender, recipe: Its names there. If `recipe` is "", recipes do not have it as a plain field.
-        shown: Whether the shutter's panel shows it below the other properties, which have code of their own.
-        told: Whether recipes write it even if it equals `absent`.
-        subtype, precision: Of Blender's property.
+        keyed_in_recipe: Whether a recipe can have a list of keys in place of the value.
+        blender: The name of the property in Blender.
+        recipe: The name of the field in recipes. "": the generic code leaves it out, and other code may write it.
+        shown: Whether the generic code of the shutter's panel shows it.
+        told: Whether recipes are written with the field even if its value equals `absent`.
+        subtype, precision: As for Blender's property: how the value is shown, and its number of decimals.
         context: The translation context of the label.
     """
 
@@ -78,10 +84,10 @@ class Labelled:
     description: str
 
     def number(self, *, default: float, **more: Any) -> Any:
-        """Declare a number that keys can change. The model holds a channel, constant by default.
+        """Declare a number that keys can change. The model holds a channel, by default a Constant of `default`.
 
         Args:
-            default: Field.default.
+            default: Field.default, and Field.absent unless `more` has that.
             more: Other attributes of Field.
         """
         more = {"keyed": True, "is_channel": True, "keyed_in_recipe": True} | more
@@ -96,11 +102,12 @@ class Labelled:
         return self.fixed(default=default, choices=choices, **more)
 
     def fixed(self, *, default: Any, made: Callable[[], Any] | None = None, **more: Any) -> Any:
-        """Declare a whole number, a text or a color, without keys.
+        """Declare a whole number, a text or a color, which keys cannot change unless `more` says so.
 
         Args:
-            default: Field.default.
-            made: Makes the default value of the model. None: it is `default`.
+            default: Field.default, and Field.absent unless `more` has that.
+            made: A function that makes the value of a new object of the model, if that differs from `default`. None:
+                the value is `default`.
             more: Other attributes of Field.
         """
         said = {"label": self.label, "description": self.description, "default": default, "absent": default} | more

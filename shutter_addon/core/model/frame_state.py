@@ -28,11 +28,12 @@ class Combine:
     """How the frames that a shutter exposes become one picture (core/pixels/compositor.py).
 
     Attributes:
-        mode: The average, lightest, darkest or median of the frames.
-        by_luminance: For lightest and darkest: choose a pixel's frame by luminance, not for each color channel.
-        threshold: A pixel of a frame leaves a trail only if its luminance in linear light is above this for lightest,
-            or below this for darkest; white is 1. The shown frame always counts. None: every frame does.
-        softness: The range of luminance around the threshold in which trails fade in.
+        mode: Each pixel is the "average", "lightest", "darkest" or "median" of its values in the frames.
+        by_luminance: For "lightest" and "darkest": take all colors of a pixel from the frame with the highest or lowest
+            luminance, instead of comparing each color channel by itself.
+        threshold: A luminance in linear light; white is 1. A frame's pixel counts only if it is brighter ("lightest")
+            or darker ("darkest"). The shown frame's pixels always count. None: all pixels count.
+        softness: The width of the range of luminance, centred on the threshold, in which pixels count in part.
     """
 
     mode: Mode = "average"
@@ -50,12 +51,29 @@ class Options:
     """The options of an effect at a frame: which frames around the shown one count, and how they become a picture.
 
     Attributes:
-        window: The length L of the window (the frames that can be exposed) in filmed frames. In a FrameState it counts
-            moments, `step` per filmed frame.
+        window: The length of the window (the frames around the shown one that can be exposed): in filmed frames, and
+            once state_at.py has completed a FrameState, in moments: `step` per filmed frame.
+        position: Whether the shown frame is the window's first ("start"), middle ("center") or last ("end") frame.
+        interpolation: How two shutters are mixed in a pixel, or two keys in time: "displacement" moves the exposure in
+            time; "value" cross-fades.
+        light: Whether frames are summed in "linear" light, or as the "encoded" values of the footage.
+        exposure: "normalized": all shutters give the same brightness; "weighted": see FrameState.gains.
+        edges: What is exposed beyond the ends of the clip or shot: "hold", "mirror", "shorten" or "slide"
+            (windows.source_frames).
+        aggregate: The side, in pixels, of the square blocks of pixels that share a shutter; 1: each pixel has its own.
+        border: Whether the pixels along the picture's edge get the default shutter, so that scribbles act only nearby.
+        stop_at_cuts: Whether exposures end at cuts in the footage, as at the ends of the clip.
         edge_aware: 0 to 1, how strictly scribbles stop at edges of the shown frame (core/pixels/conductances.py).
-        step: Moments per filmed frame. "auto", which only an effect's options have, chooses by the footage.
-        slid: Frames by which the window was moved onward, to lie inside the shot (core/model/windows.py).
-        backward: Whether the footage plays backward. A filmed frame is then the last of its moments.
+        plate_reach: Filmed frames on each side that are searched for the background behind layers.
+        decontaminate: Whether the colors of layers and background are separated where an edge mixes them in a pixel.
+        step: Moments per filmed frame, which are the filmed frame and those computed between it and the next one; 1: no
+            frames are computed. "auto": as many as the motion in the footage needs; state_at.py replaces it by their
+            number.
+        skip_repeats: Whether frames that repeat the one before are replaced by computed ones, if `step` is not 1.
+        slid: By how many moments the window was moved to lie inside the shot, for `edges` "slide"; positive: onward in
+            the direction in which the footage plays.
+        backward: Whether the footage plays backward. Then a filmed frame is the last of its moments in the window, not
+            the first.
     """
 
     window: int = Labelled("Frames", "Number of source frames that a shutter can expose").fixed(
@@ -128,12 +146,13 @@ class Options:
 class Following:
     """Where exposures look in other source frames, as they follow a motion: one motion for each shutter and frame.
 
-    A point z of the shown picture lies at turn · z + shift in another frame. motions.Similarity has the coordinates.
+    What is at a point z of the shown picture is looked up at turn · z + shift in another frame. Points are complex
+    numbers x + iy in pixels, y down (motions.Similarity).
 
     Attributes:
-        first: The source frame of the first row.
-        turns, shifts: complex128 (S, N): a row for each source frame from `first` on, a column for each shutter. 1 and
-            0 for shutters that follow nothing.
+        first: The number of the source frame of row 0, counting moments.
+        turns, shifts: complex128 (S, N): a row for each of S successive source frames, a column for each of N shutters.
+            Shutters that follow nothing have turn 1 and shift 0.
     """
 
     first: int
@@ -146,10 +165,14 @@ class Following:
         return self.turns[rows], self.shifts[rows]
 
     def between(self, start: int, end: int) -> tuple[complex, complex]:
-        """Return the turn and shift of the first shutter's motion from one source frame to another.
+        """Return the motion of the first shutter (column 0) from one source frame to another.
 
-        They are rounded, so that they do not depend on which frame is shown. Otherwise a point halfway between two
-        pixels could go to either.
+        Args:
+            start, end: The numbers of the source frames. One without a row has the motion of the nearest row.
+
+        Returns:
+            The turn and the shift: a point z in `start` lies at turn · z + shift in `end`. They are rounded to 2⁻³², so
+            that rounding errors, which depend on the shown frame, do not move a point to another pixel.
         """
         (before, after), (from_, to) = (values[:, 0] for values in self.at([start, end]))
         turn = after / before
@@ -172,19 +195,19 @@ class Following:
 
 @dataclass(frozen=True)
 class Layers:
-    """Regions that are exposed by themselves in front of the rest (core/pixels/layering.py), and their mattes.
+    """The n visible layers: regions that are exposed by themselves in front of the rest (core/pixels/layering.py).
 
-    There are n layers, the farthest first. A drawn layer consists of strokes, any other has a matte.
+    They are in order, the farthest first. A drawn layer (effect.Region) consists of strokes, any other has a matte.
 
     Attributes:
-        shutters: The index of each layer's shutter, (n,).
-        opacities: 0 to 1, (n,).
-        first: The first source frame for which mattes are known.
-        scribbles: A state for each source frame from `first` on, whose diffusion gives the mattes of drawn layers: its
-            coefficient 1 + i is the matte of layer i, coefficient 0 is what belongs to no layer. None without drawn
-            layers.
-        mattes: For each of these frames the mattes (n,) of the layers; None for a drawn layer.
-        camera: The camera's motion, as that of one shutter; None if it is unknown or still.
+        shutters: For each layer the index of its shutter.
+        opacities: For each layer its opacity, above 0, at most 1.
+        first: The number of the first source frame for which mattes are known.
+        scribbles: For each source frame from `first` on, a state from whose scribbles the mattes of the drawn layers
+            are diffused: its shutter 1 + i stands for layer i, its shutter 0 for what belongs to no layer. None if
+            there are no drawn layers, and for computed frames that the window cannot show, which need no mattes.
+        mattes: For each source frame from `first` on, a tuple with the matte of each layer, or None for a drawn layer.
+        camera: The camera's motion, as a Following with one column; None if it is unknown or still.
     """
 
     shutters: tuple[int, ...]
@@ -217,14 +240,16 @@ class FrameState:
     """The effect at one frame: all that a picture depends on, besides the footage.
 
     Attributes:
-        options: Its options at this frame, with `step` as a number.
-        bars: (N, L) float64, how much each frame of the window contributes for each shutter; shutter 0 is the default.
-        shapes: Scribbles where they lie at this frame, later ones on top.
-        reference: The sum of bars that has full brightness if `exposure` is "weighted". None: that of shutter 0.
-        following: The motions that exposures follow, or None.
-        mattes: Laid over the scribbles' coefficients, later ones on top.
-        layers: Regions that are exposed by themselves in front of the rest, or None.
-        combines: How each shutter combines its frames. Empty: all average.
+        options: The effect's options at this frame.
+        bars: (N, L) float64: how much each of the L places of the window contributes, for each of N shutters. Shutter 0
+            is the default.
+        shapes: The scribbles of regions that are no layers, where they lie at this frame, later ones on top.
+        reference: The sum of a shutter's bars that gives full brightness if Options.exposure is "weighted". None: the
+            sum of shutter 0's bars.
+        following: The motions that exposures follow; None if none of them moves.
+        mattes: The mattes of regions that are no layers. They are laid over the scribbles, later ones on top.
+        layers: Regions that are exposed by themselves in front of the rest; None if there are none.
+        combines: For each shutter how it combines its frames. Empty: all average them.
     """
 
     options: Options
@@ -238,10 +263,10 @@ class FrameState:
 
     @property
     def gains(self) -> np.ndarray:
-        """The factor (N,) for the brightness of each shutter.
+        """The factors (N,) by which the pictures of the shutters are made brighter or darker.
 
-        It is 1 by default. If `exposure` is "weighted", it is the sum of a shutter's bars / `reference`, for
-        shutters that average. Factors scale linear light, as an aperture would; encoded values are decoded first.
+        If Options.exposure is "weighted", the factor of a shutter that averages is the sum of its bars / `reference`.
+        All other factors are 1. They apply to linear light, as an aperture does; encoded values are decoded first.
         """
         exposures = self.bars.sum(axis=1)
         gains = np.ones_like(exposures)
@@ -252,9 +277,9 @@ class FrameState:
 
     @cached_property
     def open_span(self) -> tuple[int, int]:
-        """The index of the first frame of the window that any shutter exposes, and one past the last.
+        """The used part of the window: the index of the first frame that any shutter exposes, and one past the last.
 
-        If a shutter has a threshold, which needs the shown frame, the span includes that frame.
+        If a shutter has a threshold, which needs the shown frame, the span includes that frame, exposed or not.
         """
         first, last = shutters.open_span(self.bars)
         if any(combine.threshold is not None for combine in self.combines):
@@ -305,9 +330,12 @@ class FrameState:
         return replace(self, options=replace(self.options, aggregate=aggregate), layers=layers)
 
     def of(self, chosen: Sequence[int]) -> FrameState:
-        """Return the state of the chosen shutters (by index) alone, without scribbles, mattes and layers.
+        """Return a state that has only the chosen shutters, in the given order, and no scribbles, mattes and layers.
 
-        Its Options.edge_aware is 0.
+        Its Options.edge_aware is 0. Its `reference` stays that of this state, so that brightness does not change.
+
+        Args:
+            chosen: The indices of the shutters.
         """
         return FrameState(
             options=replace(self.options, edge_aware=0.0),

@@ -18,12 +18,12 @@ EASES: tuple[Ease, ...] = ("linear", "bezier", "constant")
 
 
 def eased(u: float, ease: Ease) -> float:
-    """Return how far a value has changed from one key to the next, 0 to 1.
+    """Return how far a value has changed from one key to the next: 0 at the first key, 1 at the second.
 
     Args:
-        u: How much of the time between the two keys has passed, 0 to 1.
-        ease: "linear"; "constant", which jumps at the end; or "bezier", whose flat handles are a third of the span
-            long, which is u²(3 − 2u).
+        u: The share of the time between the two keys that has passed, 0 to 1.
+        ease: "linear": u. "constant": 0 until the second key. "bezier": u²(3 − 2u), slow at both ends, as with flat
+            handles in Blender.
     """
     if ease == "constant":
         return 0.0 if u < 1 else 1.0
@@ -33,7 +33,7 @@ def eased(u: float, ease: Ease) -> float:
 def span(frames: Sequence[float], frame: float) -> tuple[int, int, float]:
     """Return the indices of the keys before and after a frame, and the share 0 to 1 of the way between them.
 
-    Outside the keys and on a key, both indices are the nearest key's.
+    Outside the keys and on a key, both indices are the nearest key's, and the share is 0.
 
     Args:
         frames: The keys' frames, ascending.
@@ -49,13 +49,16 @@ def span(frames: Sequence[float], frame: float) -> tuple[int, int, float]:
 
 
 def between_bars(first: ArrayLike, second: ArrayLike, u: float, interpolation: str = "displacement") -> np.ndarray:
-    """Return bars (L,) between those of two keys.
+    """Interpolate the bars of a shutter between two keys.
 
     Args:
-        first: The bars (L,) of the first key.
-        second: The bars (L,) of the second key.
+        first, second: The bars (L,) at the two keys. For "displacement", each needs an open bar (above 0).
         u: The share of the way from the first to the second, 0 to 1.
-        interpolation: "displacement" moves the bars' light through the frames, "value" fades each bar by itself.
+        interpolation: "displacement" moves the open bars in time, from frame to frame (shutters.displace). "value"
+            interpolates each bar by itself, so that the first bars fade out as the second ones fade in.
+
+    Returns:
+        The bars, (L,) float64. In either case their sum is interpolated linearly.
     """
     before, after = np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64)
     if u <= 0:
@@ -93,9 +96,9 @@ class Keys:
     """A channel of numbers or arrays at keys, interpolated in between.
 
     Attributes:
-        frames: The keys' frames, ascending.
+        frames: The keys' frames, ascending. Before the first and after the last, the value stays as at that key.
         values: The value at each key.
-        eases: The ease from each key to the next.
+        eases: For each key the ease from it to the next; that of the last key is not used.
     """
 
     frames: tuple[float, ...]
@@ -113,8 +116,9 @@ class Samples:
     """A channel of values that were read at some frames in advance, such as those of an F-curve of Blender.
 
     Attributes:
-        values: The value at each of these frames. If it is a UserError, `at` raises it.
-        keys: Frames and eases of the curve's keys, ascending; empty if it had none.
+        values: {frame: value}. `at` raises a value that is a UserError.
+        keys: (frame, ease to the next key) of each key of the curve, ascending, for code that needs keys; `at` does not
+            use them. Empty: the curve had none.
     """
 
     values: dict[float, Any]
@@ -139,14 +143,15 @@ class Computed:
 
 @dataclass(frozen=True)
 class SourceTime:
-    """The channel of Effect.time: (source frame, whether the footage runs backward), from the keys of the source frame.
+    """A channel for Effect.time: its `at` returns (source frame, whether the footage runs backward).
 
-    While the source frame stands still, the direction is that of the last movement towards one of its keys. Without
-    any, it is forward.
+    The footage runs backward where the source frame falls within the next half timeline frame. Where it stands still,
+    the direction in which it arrived at a key counts: at the latest key so far before which it was moving. Without such
+    a key, it is forward.
 
     Attributes:
-        numbers: Channel of the source frame; the first one is 1.
-        keys: Frames and eases of its keys, ascending.
+        numbers: Channel of the source frame, with a fraction; the footage's first frame is 1.
+        keys: (timeline frame, ease to the next key) of each key of the source frame, ascending.
     """
 
     numbers: Channel
@@ -170,9 +175,12 @@ class Bars:
     """A shutter's bars (L,) float64 over time.
 
     Attributes:
-        channel: Channel of the bars. It counts at keys, before the first and after the last, and where bars fade.
-        keys: Frames and eases of the keys, ascending; without keys, only `channel` counts.
-        share: Channel of the share 0 to 1 of the way between the keys around a frame. None: the eases determine it.
+        channel: Channel of the bars. At keys, and between keys where each bar fades by itself, its values are used as
+            they are. Elsewhere between keys, the bars of the keys before and after are displaced (`at`).
+        keys: (frame, ease to the next key) of each key, ascending. Before the first and after the last, that key's bars
+            stay. Empty: `channel` is used at every frame.
+        share: Channel of how far the bars have moved from the key before a frame to the key after it, 0 to 1. None:
+            that follows from the eases.
     """
 
     channel: Channel
@@ -184,14 +192,17 @@ class Bars:
     ) -> np.ndarray:
         """Return the bars at a frame.
 
-        Between keys they are interpolated by displacement (paper §3.4.1, over time). If one of the keys around the
-        frame has a closed shutter, which cannot be displaced, they fade as with "value".
-
         Args:
             frame: The frame.
-            interpolation: Options.interpolation; with "value" bars fade by themselves between keys.
-            spread: Turns bars of filmed frames into bars of moments (Shutter.spread), so that displacement passes
-                through these.
+            interpolation: Options.interpolation, for frames between two keys. "displacement" moves the open bars in
+                time (paper §3.4.1); if all bars of one of the two keys are 0, it does as "value" does. "value" uses
+                `channel`, in which each bar fades by itself.
+            spread: A function that turns bars of filmed frames (L,) into bars of moments (L · steps,) (Shutter.spread).
+                It is applied before displacement, which so can open moments between filmed frames. By default, bars
+                stay those of filmed frames.
+
+        Returns:
+            The bars that `spread` makes.
         """
         if not self.keys:
             return spread(self.channel.at(frame))
@@ -212,9 +223,11 @@ class Bars:
 def eased_span(frames: Sequence[float], eases: Sequence[Ease], frame: float) -> tuple[int, int, float]:
     """Return the indices of the keys before and after a frame, and the eased share 0 to 1 of the way between them.
 
+    Outside the keys and on a key, both indices are the nearest key's, and the share is 0.
+
     Args:
         frames: The keys' frames, ascending.
-        eases: The ease from each key to the next.
+        eases: For each key the ease from it to the next; that of the last key does not matter.
         frame: The frame.
     """
     before, after, share = span(frames, frame)

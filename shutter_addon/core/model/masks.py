@@ -48,15 +48,18 @@ _BLENDS: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
 
 @dataclass(frozen=True)
 class MaskSpline:
-    """A spline of a mask with its handles, in mask space. It consists of tuples, so that it is hashable.
+    """A Bézier spline of a mask, in mask space: a square as large as the picture's larger side, centred on the picture.
+
+    Coordinates are 0 to 1 across that square, y up. All is in tuples, so that a spline is hashable.
 
     Attributes:
-        points: Left handle, point and right handle, ((x, y), (x, y), (x, y)) each.
-        weights: The width of the feather at each point.
-        feathers: For each point, the feather points ((u, factor), …) of the segment that follows it, u ascending from 0
-            to 1. The factors multiply the points' weights.
-        cyclic: Whether the spline is closed.
-        weight_interpolation: How the feather's width changes from point to point: "EASE" or "LINEAR".
+        points: For each point its left handle, itself and its right handle: ((x, y), (x, y), (x, y)).
+        weights: For each point the width of the feather (the soft edge) there, in mask space.
+        feathers: For each point the feather points ((u, factor), …) on the segment from it to the next point, by
+            ascending u: the place on the segment, 0 to 1. The feather's width there is the factor times the width that
+            the weights at the segment's ends give by linear interpolation.
+        cyclic: Whether the spline is closed: a last segment goes from the last point to the first.
+        weight_interpolation: How the feather's width changes between these places: "EASE" (slow at both) or "LINEAR".
     """
 
     points: tuple[tuple[tuple[float, float], ...], ...]
@@ -116,9 +119,17 @@ def _layer_value(layer: MaskLayer, width: int, height: int) -> np.ndarray:
 
 
 def _outlines(spline: MaskSpline, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the polygons (n, 2) float64 of a spline and of its feather's outer edge, point by point.
+    """Return a spline and the outer edge of its feather (soft edge) as polygons.
 
     A feather is at least a pixel wide, which is the only anti-aliasing.
+
+    Args:
+        spline: The spline, with at least two points.
+        width, height: The picture's size in pixels.
+
+    Returns:
+        The spline's polygon and the feather's, (n, 2) float64 each, in fractions of the picture, y up. Points with the
+        same index belong together.
     """
     points, weights = np.array(spline.points, np.float64), np.array(spline.weights, np.float64)
     steps = _steps(spline, points, weights, max(width, height))
@@ -131,14 +142,14 @@ def _outlines(spline: MaskSpline, width: int, height: int) -> tuple[np.ndarray, 
 
 
 def _steps(spline: MaskSpline, points: np.ndarray, weights: np.ndarray, larger: int) -> int:
-    """Return into how many pieces each segment of a spline is divided: a piece for every 4 pixels of the longest one.
+    """Return into how many straight pieces each segment of a spline is divided, the same number for all: 4 to 32.
 
-    There are more pieces where the feather's width changes quickly.
+    It is one for every 4 pixels of the longest segment, and more if the feather's width changes quickly somewhere.
 
     Args:
         spline: The spline.
-        points: Its points and handles, (n, 3, 2) in mask space.
-        weights: The feather's width (n,) at the points.
+        points: MaskSpline.points as an array (n, 3, 2).
+        weights: MaskSpline.weights as an array (n,).
         larger: The picture's larger side in pixels.
     """
     following = np.roll(points, -1, axis=0)
@@ -154,12 +165,16 @@ def _steps(spline: MaskSpline, points: np.ndarray, weights: np.ndarray, larger: 
 
 
 def _positions(spline: MaskSpline, count: int, steps: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return where the points of a spline's polygon lie on it: segment numbers (n,), and u (n,), 0 to 1 along each.
+    """Return at which places of a spline the n points of its polygon lie.
 
     Args:
         spline: The spline.
-        count: The number of its points.
-        steps: The number of pieces of each segment.
+        count: The number of the spline's own points. Segment i goes from point i to the next one.
+        steps: Into how many pieces each segment is divided.
+
+    Returns:
+        For each point of the polygon the index of its segment (n,), and its place u (n,) on that, from 0 to 1. Each
+        segment has the places 0, 1 / steps, … below 1. An open spline has one more: 1, on the last segment.
     """
     segments = count if spline.cyclic else count - 1
     segment, u = np.repeat(np.arange(segments), steps), np.tile(np.arange(steps) / steps, segments)
@@ -167,9 +182,17 @@ def _positions(spline: MaskSpline, count: int, steps: int) -> tuple[np.ndarray, 
 
 
 def _at(spline: MaskSpline, points: np.ndarray, segment: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """Return the points (n, 2) of a spline at places `u` (n,), 0 to 1, of segments (n,).
+    """Return the points of a spline at n places.
 
-    Past the end of an open spline, it is the last point.
+    Args:
+        spline: The spline.
+        points: MaskSpline.points as an array (count, 3, 2).
+        segment: For each place the index of its segment (n,). Segment i goes from point i to the next one. For a closed
+            spline, indices wrap around; for an open one, segment count − 1 gives the last point.
+        u: The place on the segment (n,), 0 to 1.
+
+    Returns:
+        The points, (n, 2), in mask space.
     """
     this, following = points[segment % len(points)], points[(segment + 1) % len(points)]
     a, b, c, d = this[:, 1], this[:, 2], following[:, 0], following[:, 1]
@@ -194,9 +217,15 @@ def _offset(
 
 
 def _widths(spline: MaskSpline, weights: np.ndarray, segment: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """Return the feather's width (n,) in mask space at places `u` (n,), 0 to 1, of segments (n,).
+    """Return the feather's width at n places of a spline, (n,), in mask space.
 
-    Between the spline's points and feather points it is interpolated, eased or linearly.
+    Between the spline's points and feather points the width is interpolated, by MaskSpline.weight_interpolation.
+
+    Args:
+        spline: The spline.
+        weights: MaskSpline.weights as an array.
+        segment: For each place the index of its segment (n,). Segment i goes from point i to the next one.
+        u: The place on the segment (n,), 0 to 1.
     """
     result = np.empty(len(u))
     for index, feather in enumerate(spline.feathers):

@@ -96,13 +96,19 @@ def separated(colors: np.ndarray, matte: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 def _nearer(picture: np.ndarray, matte: np.ndarray, own: np.ndarray, behind: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Correct estimated colours of a subject and its background so that they mix to the picture's: (C, …) each.
+    """Correct estimated colours of a subject and its background so that their mix comes nearer to the picture.
+
+    A part of the error is added to the subject's colour, in proportion to its matte, and a part to the background's, in
+    proportion to 1 − matte. With a matte of 0 or 1 the mix becomes exact; at 0.5, half of the error remains.
 
     Args:
-        picture: The exact mixed colours (C, …).
-        matte: (…), 0 to 1.
-        own: The estimate for the subject (C, …).
-        behind: The estimate for the background (C, …).
+        picture: The picture's colours (C, …), each a mix of the subject's and the background's.
+        matte: The subject's share in the mix (…), 0 to 1.
+        own: The estimated colours of the subject (C, …).
+        behind: The estimated colours of the background (C, …).
+
+    Returns:
+        The corrected colours of the subject and those of the background, (C, …) each.
     """
     left = picture - matte * own - (1 - matte) * behind
     return own + matte * left, behind + (1 - matte) * left
@@ -111,17 +117,20 @@ def _nearer(picture: np.ndarray, matte: np.ndarray, own: np.ndarray, behind: np.
 def _surroundings(
     own: np.ndarray, behind: np.ndarray, matte: np.ndarray, radius: int, places: Sequence[np.ndarray]
 ) -> list[np.ndarray]:
-    """Return mean colours around pixels: of the subject, weighted by its matte, and of the background, by the rest.
+    """Estimate the colours of a subject and its background at some pixels: weighted means over the square around each.
+
+    Each pixel in the square is weighted by the matte for the subject, and by 1 − matte for the background. To be quick,
+    means for a large radius are computed on a grid of cells of several pixels.
 
     Args:
         own: The subject's colours (C, h, w).
         behind: The background's colours (C, h, w).
-        matte: (h, w).
-        radius: How far the means go, in pixels.
-        places: Rows and columns of the pixels.
+        matte: The subject's matte (h, w), 0 to 1.
+        radius: How far the square reaches to each side, in pixels; only approximate where cells are used.
+        places: The row indices and the column indices of the pixels, two integer arrays that broadcast to a shape (…).
 
     Returns:
-        Two arrays (C, …) float32.
+        The subject's means and the background's, (C, …) float32 each; 0 where all weights are 0.
     """
     cell = max(radius // _CELLS, 1)
     rows, columns = (place // cell for place in places)
@@ -140,11 +149,14 @@ def _cells(planes: np.ndarray, size: int) -> np.ndarray:
 
 
 def _box_sums(values: np.ndarray, radius: int) -> np.ndarray:
-    """Return for each cell of values (C, h, w) the sum over the square of cells around it, as float64.
+    """Sum values over the square of cells around each cell.
 
     Args:
-        values: The cells. Beyond the edges there are zeros.
-        radius: How many cells the square has on each side of the cell.
+        values: The cells' values (C, h, w). Cells beyond the edges count as 0.
+        radius: How many cells the square reaches to each side. Its side is 2 · radius + 1 cells.
+
+    Returns:
+        The sums (C, h, w) float64.
     """
     for axis in (1, 2):
         pads = [(0, 0)] * 3

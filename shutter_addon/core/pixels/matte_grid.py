@@ -15,14 +15,17 @@ _ROWS = 32  # rows at a time, which fit into a processor's cache
 
 
 def fitted(values: np.ndarray, width: int, height: int) -> np.ndarray:
-    """Return a matte, scaled to fit into the middle of a picture with its aspect kept and black around it.
+    """Scale a matte to fit into the middle of a picture. Its aspect is kept, and the rest of the picture is black (0).
 
-    A pixel is the mean of what it covers where the matte is reduced, and linearly interpolated where it is enlarged. A
-    pixel on the matte's edge is black in proportion. A matte of the right size is returned itself.
+    Where the matte is reduced, a pixel is the mean of the matte's area that it covers. Where it is enlarged, values are
+    interpolated linearly. A pixel that the matte covers only in part is darker in proportion.
 
     Args:
-        values: (h, w) float32, 0 … 1.
-        width, height: Of the picture.
+        values: The matte (h, w) float32, 0 to 1.
+        width, height: The picture's size in pixels.
+
+    Returns:
+        The scaled matte (height, width) float32; `values` itself if it has this size already.
     """
     if values.shape == (height, width):
         return values
@@ -32,9 +35,16 @@ def fitted(values: np.ndarray, width: int, height: int) -> np.ndarray:
 
 
 def feathered(values: np.ndarray, width: float) -> np.ndarray:
-    """Return values (h, w) float32, 0 … 1, blurred by a Gaussian that spreads a hard edge over `width` pixels.
+    """Blur a matte with a Gaussian.
 
-    Beyond the picture its edges continue. With width 0, the values are returned themselves.
+    Beyond the matte's edges, the pixels at the edge are repeated.
+
+    Args:
+        values: The matte (h, w) float32, 0 to 1.
+        width: Over how many pixels a hard edge spreads: 95 % of its step lie within this width.
+
+    Returns:
+        The blurred matte (h, w) float32; `values` itself if `width` is 0.
     """
     if width <= 0:
         return values
@@ -58,10 +68,17 @@ def block_means(values: np.ndarray, block: int) -> np.ndarray:
 def block_sums(
     picture: np.ndarray, size: int, dtype: DTypeLike, *, beyond: Literal["edge", "constant"] = "edge"
 ) -> np.ndarray:
-    """Return sums (⌈h/size⌉, ⌈w/size⌉, C) over blocks of a picture's pixels (h, w, C).
+    """Sum the pixels of each block of size × size pixels of a picture.
 
     Args:
-        beyond: How the picture continues, as in numpy.pad: "constant" for 0.
+        picture: The picture (h, w, C).
+        size: The side of a block in pixels.
+        dtype: The type of the sums, in which they are added; it has to hold the largest sum.
+        beyond: How the picture continues if its last blocks are incomplete: "edge" repeats its last row and column,
+            "constant" adds zeros.
+
+    Returns:
+        The sums (⌈h/size⌉, ⌈w/size⌉, C).
     """
     down, right = (-length % size for length in picture.shape[:2])
     if down or right:
@@ -76,12 +93,15 @@ def block_sums(
 
 
 def _resampled(values: np.ndarray, down: Taps, across: Taps) -> np.ndarray:
-    """Return values (h, w) resampled along rows and columns.
+    """Resample values (h, w) along both axes: each new row and column is a weighted sum of old ones.
 
     Args:
-        values: The values.
-        down: The taps that make the new rows.
-        across: The taps that make the new columns.
+        values: The values (h, w) float32.
+        down: For each of the H new rows, the indices of the old rows and their weights (see Taps).
+        across: For each of the W new columns, the same of the old columns.
+
+    Returns:
+        The new values (H, W) float32, clipped to at most 1.
     """
     if len(across[0]) > values.shape[1]:  # transpose while it is small
         return _weighted(_turned(_weighted(_turned(values), *across)), *down)
@@ -89,13 +109,16 @@ def _resampled(values: np.ndarray, down: Taps, across: Taps) -> np.ndarray:
 
 
 def blurred(values: np.ndarray, kernel: np.ndarray) -> np.ndarray:
-    """Return values (h, w) ≤ 1 filtered with a kernel, vertically and horizontally.
+    """Filter values with a symmetric kernel, vertically and horizontally.
 
-    Beyond the picture its edges continue.
+    Beyond the edges, the pixels at the edge are repeated.
 
     Args:
-        values: The values.
-        kernel: Weights at distances 0, 1, 2, … to both sides.
+        values: The values (h, w) float32, at most 1.
+        kernel: The weights at distances 0, 1, 2, … pixels; each but the first counts on both sides.
+
+    Returns:
+        The filtered values (h, w), clipped to at most 1, since rounded weights can add up to slightly more.
     """
     return _turned(_convolved(_turned(_convolved(values, kernel)), kernel))
 
@@ -106,12 +129,15 @@ def _turned(values: np.ndarray) -> np.ndarray:
 
 
 def _weighted(values: np.ndarray, indices: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Return rows (n, w) float32 that are weighted sums of the rows of `values` (h, w), at most 1.
+    """Return weighted sums of rows.
 
     Args:
-        values: The values.
-        indices: Which rows are summed, (n, k).
-        weights: Their weights, (n, k).
+        values: The rows to choose from, (h, w).
+        indices: For each sum, the indices of the k rows that are added, (n, k).
+        weights: The weights of these rows, (n, k).
+
+    Returns:
+        The sums (n, w) float32, clipped to at most 1, since rounded weights can add up to slightly more.
     """
     result = np.empty((len(indices), values.shape[1]), np.float32)
     weights = weights.astype(np.float32)[:, :, None]
@@ -144,12 +170,16 @@ def _convolved(values: np.ndarray, kernel: np.ndarray) -> np.ndarray:
 
 
 def _fit(length: int, size: int, scale: float) -> Taps:
-    """Return the taps (which pixels are summed for each new one, and their weights) of an axis for `fitted`.
+    """Find how `fitted` computes the picture's pixels along one axis from the matte's pixels.
 
     Args:
-        length: The matte's pixels along the axis.
-        size: The picture's.
-        scale: The picture's pixels for each pixel of the matte, which lies in the picture's middle.
+        length: The matte's number of pixels along the axis.
+        size: The picture's number of pixels along the axis.
+        scale: How many pixels of the picture one pixel of the matte becomes. The matte lies in the picture's middle.
+
+    Returns:
+        For each of the picture's pixels, the indices of the matte's pixels to add and their weights, (size, k) each.
+        Pixels of the picture beyond the matte have weights of 0.
     """
     edges = (np.arange(size + 1) - size / 2) / scale + length / 2
     start, stop = edges[:-1, None], edges[1:, None]
@@ -168,9 +198,15 @@ def _fit(length: int, size: int, scale: float) -> Taps:
 
 
 def _blocks(length: int, block: int) -> Taps:
-    """Return the taps (which rows are summed, and their weights) for means of blocks of rows.
+    """Find which rows to average for means of blocks of successive rows.
 
-    The last block may be smaller.
+    Args:
+        length: The number of rows.
+        block: Rows per block. The last block may have fewer.
+
+    Returns:
+        For each block, the indices of its rows and their weights, (⌈length/block⌉, block) each. In a smaller last
+        block, the surplus weights are 0.
     """
     indices = np.arange(0, length, block)[:, None] + np.arange(block)
     present = indices < length
@@ -178,12 +214,15 @@ def _blocks(length: int, block: int) -> Taps:
 
 
 def _gaussian(sigma: float) -> np.ndarray:
-    """Return the weights float32 of a Gaussian blur at distances 0, 1, 2, … pixels.
+    """Return one side of the kernel of a Gaussian blur, as `blurred` takes it.
 
-    They are the Gaussian's integral over each pixel, so a hard edge becomes the error function.
+    Each weight is the Gaussian's integral over one pixel, so a hard edge becomes the error function.
 
     Args:
         sigma: The standard deviation in pixels.
+
+    Returns:
+        The weights float32 at distances 0, 1, 2, … pixels, to 3.3 standard deviations. Both sides together add up to 1.
     """
     reach = math.ceil(_REACH * sigma)
     ends = np.array([math.erf((i - 0.5) / (sigma * math.sqrt(2))) for i in range(reach + 2)])
@@ -191,9 +230,17 @@ def _gaussian(sigma: float) -> np.ndarray:
 
 
 def _means(length: int, step: int) -> Taps:
-    """Return the taps (which pixels are summed, and their weights) for means of cells of `step` pixels.
+    """Find which pixels to average for a coarser grid, whose cells are `step` pixels wide.
 
-    One more cell at each end repeats the last pixel.
+    The grid has one more cell before the first pixel and one after the last. They repeat the pixel at that end, so that
+    `_lines` can interpolate up to the ends.
+
+    Args:
+        length: The number of pixels along the axis.
+        step: Pixels per cell.
+
+    Returns:
+        For each cell, the indices of its pixels and their equal weights, (⌈length/step⌉ + 2, step) each.
     """
     cells = np.arange(-1, math.ceil(length / step) + 1)[:, None]
     indices = (cells * step + np.arange(step)).clip(0, length - 1)
@@ -201,9 +248,14 @@ def _means(length: int, step: int) -> Taps:
 
 
 def _lines(length: int, step: int) -> Taps:
-    """Return the taps (which cells are summed, and their weights) for `length` pixels.
+    """Find which cells to mix to turn the coarser grid of `_means` into pixels again, by linear interpolation.
 
-    They interpolate linearly between the middles of the cells of `_means`.
+    Args:
+        length: The number of pixels along the axis.
+        step: Pixels per cell.
+
+    Returns:
+        For each pixel, the indices of the two cells whose middles are nearest, and their weights, (length, 2) each.
     """
     place = (np.arange(length)[:, None] + 0.5) / step + 0.5
     indices = np.floor(place).astype(int) + np.arange(2)
@@ -214,11 +266,14 @@ Box = tuple[slice, slice]  # rows and columns
 
 
 def box_around(cover: np.ndarray, reach: int) -> Box | None:
-    """Return the rows and columns of the box around all pixels of a matte (h, w) above 0, or None without any.
+    """Return the smallest box that contains all pixels of a matte above 0, enlarged by a margin.
 
     Args:
-        cover: The matte.
-        reach: Pixels by which the box is larger on each side, within the matte.
+        cover: The matte (h, w).
+        reach: The margin on each side in pixels. The box is cut off at the matte's edges.
+
+    Returns:
+        The slices of rows and of columns, which index the box; None if no pixel is above 0.
     """
     places = [np.flatnonzero(cover.max(axis=axis) > 0) for axis in (1, 0)]
     if not places[0].size:

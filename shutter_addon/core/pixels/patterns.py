@@ -11,11 +11,15 @@ _OFF = 0.3  # keeps pixels' middles off the lines' edges, where rounding would d
 
 
 def marks(index: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return which places have the ink of a shutter's pattern: bool, shaped like x and y.
+    """Tell which places have ink in a shutter's pattern, which helps those who cannot tell the shutters' colors apart.
 
     Args:
-        index: The shutter's. The first one's pattern is plain, and patterns repeat after COUNT shutters.
-        x, y: Places in units of the interface (pixels at 100 %), y up.
+        index: The shutter's index, from 0. Shutter 0 has no ink at all; patterns repeat after COUNT shutters.
+        x, y: Coordinates of the places, arrays of one shape, y up, in units of the interface (pixels if its scale is
+            1).
+
+    Returns:
+        Booleans shaped like x and y.
     """
     across, up = x % _PERIOD < _WIDTH, y % _PERIOD < _WIDTH
     rising, falling = (x - y + _OFF) % _SLANTED < _WIDTH, (x + y + _OFF) % _SLANTED < _WIDTH
@@ -31,11 +35,15 @@ def ink(color: Sequence[float]) -> tuple[float, float, float]:
 
 
 def painted(color: Sequence[float], index: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return a shutter's color with its pattern: (..., 3), display code values.
+    """Paint a shutter's color with its pattern: the color, with ink at STRENGTH of opacity over it (`ink`).
 
     Args:
-        color: The color (3,).
-        index, x, y: As for `marks`.
+        color: The shutter's color (3,), display code values 0 to 1.
+        index: The shutter's index, from 0, which determines the pattern (`marks`).
+        x, y: Coordinates of the places to paint, arrays of one shape, y up, in units of the interface, as for `marks`.
+
+    Returns:
+        The colors at these places (…, 3), display code values.
     """
     share = STRENGTH * marks(index, x, y)[..., None]
     return (1 - share) * np.asarray(color) + share * np.array(ink(color))

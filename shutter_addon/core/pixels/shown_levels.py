@@ -11,11 +11,12 @@ _HASH = np.uint32(1103515245)
 
 @dataclass(frozen=True)
 class Display:
-    """The conversion from scene-linear light to 8-bit levels, as Blender does it for a file.
+    """The conversion from scene-linear light to the 8-bit levels that Blender would write to a file, to the bit.
 
     Attributes:
-        dither: The intensity of dither, ≥ 0, as in Blender.
-        transfer: Converts light float32 of any shape to code values float32, elementwise and with Blender's bits.
+        dither: The intensity of dither (noise against banding) as in Blender's render settings; 0: no noise.
+        transfer: Blender's view transform: converts scene-linear light (any shape, float32) to display code values, of
+            which white is 1 (same shape, float32), element by element.
     """
 
     dither: float
@@ -26,19 +27,29 @@ class Display:
         return rounded(self.transfer(light) + noise[..., None])
 
     def noise(self, width: int, height: int) -> np.ndarray:
-        """Return the noise of dither (height, width) float32, bottom row first, for the code values of all channels.
+        """Return the noise to add to code values before they are rounded to levels (see `levels`).
 
-        It is the same for all frames. Do not modify it.
+        The noise is the same for all frames and all channels. Do not modify it: it is cached.
+
+        Returns:
+            The noise (height, width) float32, the bottom row first; zeros if `dither` is 0.
         """
         return _noise(width, height, self.dither)
 
 
 @lru_cache(2)
 def _noise(width: int, height: int, dither: float) -> np.ndarray:
-    """Return the noise of dither (height, width) to add to code values, of which white is 1; bottom row first.
+    """Make Blender's dither noise: triangularly distributed, between −0.0033 · dither and 0.0033 · dither.
 
-    It is triangularly distributed within ±0.0033 · dither, like Blender's. Do not modify it: it is cached. It is made
-    by the hash iqint3 of the pixel's place (Jarzynski and Olano, Hash Functions for GPU Rendering, 2020).
+    The noise of a pixel is a hash of its place: iqint3 (Jarzynski and Olano, Hash Functions for GPU Rendering, 2020).
+
+    Args:
+        width, height: The picture's size in pixels.
+        dither: The intensity; 0: zeros are returned.
+
+    Returns:
+        Noise (height, width) float32 to add to code values, of which white is 1; the bottom row first. It is cached, so
+        do not modify it.
     """
     if not dither:
         return np.zeros((height, width), np.float32)

@@ -50,15 +50,21 @@ _Fits = Callable[[float, float, float, float], bool]
 
 
 def with_keys(effect: Effect, shown: range, contents: Iterable[FileContent | RampContent] = ()) -> Effect:
-    """Return an effect in the form that recipes have, with keys instead of sampled channels.
+    """Convert an effect to the form that recipes have: keys instead of values at every frame.
 
-    Regions without strokes are left out, and so are drawings before the first with strokes. Widths and options are
-    constant, as at the first frame.
+    The keys give the effect's values at whole frames, within TOLERANCE. Regions that consist of strokes but have none
+    are left out, and so are a region's drawings before the first one that has strokes. A shutter that follows a region
+    that is left out follows nothing. Properties that recipes cannot key, such as options, become constant: they have
+    the value at the first frame.
 
     Args:
-        effect: The effect, with channels that are sampled at the frames `shown`, at their keys and at drawings.
-        shown: The timeline frames at which it is shown. The first is the recipe's frame 1.
-        contents: The recipe's contents of matte regions, in order, without those of outlines and subjects.
+        effect: The effect. Its channels are sampled at all frames in `shown`, and at the frames of keys and drawings.
+        shown: The timeline frames at which the effect is shown. The first one becomes the recipe's frame 1.
+        contents: The content for each region of the effect that has a matte file or ramp, in the order of regions. It
+            replaces the region's own. Outlines and subjects take none.
+
+    Returns:
+        The converted effect, which recipe_file.dump can write.
 
     Raises:
         EffectError: The effect cannot be rendered.
@@ -95,9 +101,13 @@ def _free(name: str, taken: Collection[str]) -> str:
 
 
 def _region_names(effect: Effect) -> list[str]:
-    """Return names for an effect's regions, under which shutters can follow them.
+    """Name an effect's regions so that a recipe can say by name what a shutter follows.
 
-    Names of followed regions become unique, and different from the word for the camera.
+    A region that a shutter follows gets a unique name other than "camera": "Region" if it has none, and a number at the
+    end if needed. A region called "camera" is renamed, too, if a shutter follows the camera. Others keep their names.
+
+    Returns:
+        A name for each region, in order.
     """
     followed = [shutter.follow for shutter in effect.shutters if shutter.follow]
     names = [region.name for region in effect.regions]
@@ -111,14 +121,14 @@ def _region_names(effect: Effect) -> list[str]:
 def _shutter(
     effect: Effect, index: int, name: str, follow: Subject | None, interpolation: Interpolation, shown: range
 ) -> Shutter:
-    """Return the shutter with an index as a recipe has it, with keys.
+    """Convert one shutter of an effect to the form that recipes have, with keys.
 
     Args:
         effect: The effect.
-        index: The shutter's index.
+        index: The shutter's index in the effect.
         name: Its name in the recipe.
-        follow: What it follows in the recipe.
-        interpolation: Options.interpolation.
+        follow: The converted region or camera that it follows; None: it follows nothing.
+        interpolation: Options.interpolation: how bars change between keys.
         shown: As for `with_keys`.
     """
     shutter = effect.shutters[index]
@@ -129,9 +139,14 @@ def _shutter(
 
 
 def _said(part: Any, shown: range) -> dict[str, Any]:
-    """Return the properties of an effect, shutter, region or camera as a recipe has them: {attribute's name: value}.
+    """Convert the properties of a part of an effect to the form that recipes have: {attribute's name: value}.
 
-    Values over time become channels with keys, or constant ones.
+    These are the properties that the model declares as fields. A sampled number that recipes can key gets keys; any
+    other value over time becomes the constant value that it has at the first shown frame.
+
+    Args:
+        part: The Effect, or one of its shutters or regions, or its camera.
+        shown: As for `with_keys`.
     """
     said: dict[str, Any] = {}
     for name, each in fields_of(part.__class__).items():
@@ -170,12 +185,15 @@ def _bars(effect: Effect, index: int, interpolation: Interpolation, shown: range
 
 
 def _keyed(eased: _Eased, value: Callable[[float], Any], shown: range) -> Keys:
-    """Return a channel that has the value at each of the keys, with frames counted as in a recipe.
+    """Make a channel with keys at some frames, with values that a function returns.
 
     Args:
-        eased: Timeline frames and eases of the keys.
+        eased: The timeline frame of each key, and the ease until the next key.
         value: Returns the value at a timeline frame.
         shown: As for `with_keys`.
+
+    Returns:
+        The channel, with frames counted as in a recipe.
     """
     frames, eases = zip(*eased, strict=True)
     return Keys(tuple(_frame(frame, shown) for frame in frames), tuple(map(value, frames)), eases)
@@ -188,12 +206,16 @@ def _time(time: Channel, shown: range) -> SourceTime:
 
 
 def _number_keys(at: Callable[[float], float], channel: Channel, shown: range) -> Keys:
-    """Find keys for a number that changes over time, and return them as a channel of a recipe.
+    """Find keys that reproduce a number which changes over time.
 
     Args:
         at: Returns the number at a timeline frame.
-        channel: The channel of the effect; if it is sampled, it has the keys to begin with.
+        channel: The effect's channel of the number. If it is sampled, the search begins with the frames and eases of
+            its own keys. Otherwise the result has one key, at the first shown frame.
         shown: As for `with_keys`.
+
+    Returns:
+        The channel with keys, with frames counted as in a recipe.
     """
     # float32 has no more digits for large numbers.
     fits = _straight(lambda frame: np.array(at(frame)), lambda largest: max(TOLERANCE, 2e-6 * float(largest)))
@@ -204,11 +226,16 @@ def _number_keys(at: Callable[[float], float], channel: Channel, shown: range) -
 
 
 def _straight(at: Callable[[float], np.ndarray], allowed: Callable[[np.ndarray], ArrayLike]) -> _Fits:
-    """Return a test for `_keys`: whether linear interpolation between two keys gives the right numbers at a frame.
+    """Make the test that `_keys` needs for numbers that are interpolated linearly between two keys.
 
     Args:
         at: Returns the exact numbers at a timeline frame.
-        allowed: Returns the allowed error for the larger absolute values of the two keys.
+        allowed: Returns the largest allowed error of each number, given the larger of its absolute values at the two
+            keys.
+
+    Returns:
+        fits(first, second, frame, share): whether the mix (1 − share) · at(first) + share · at(second) of the numbers
+        at two keys is right at `frame`, within the allowed error.
     """
 
     def fits(first: float, second: float, frame: float, share: float) -> bool:
@@ -222,13 +249,17 @@ def _straight(at: Callable[[float], np.ndarray], allowed: Callable[[np.ndarray],
 def _region(
     region: Region | MatteRegion, name: str, contents: Iterator[FileContent | RampContent], shown: range
 ) -> Region | MatteRegion | None:
-    """Return a region as a recipe has it, with keys, or None if nothing is drawn of it.
+    """Convert a region to the form that recipes have, with keys.
 
     Args:
         region: The region.
         name: Its name in the recipe.
-        contents: The remaining contents of the recipe's matte regions; one of them is taken for a matte or ramp.
+        contents: Yields the contents that are left of `with_keys`. A region with a matte file or ramp takes the next
+            one; others take none.
         shown: As for `with_keys`.
+
+    Returns:
+        The converted region; None if it consists of strokes but has none.
     """
     said = _said(region, shown) | {"name": name}
     if isinstance(region, MatteRegion) and not isinstance(region, OutlineRegion | SubjectRegion):
@@ -253,12 +284,16 @@ def _region(
 
 
 def _moves(moving: Subject, fixed: Mapping[float, Ease], shown: range) -> Moves:
-    """Return the placement of a region or camera over time as a recipe has it, with keys.
+    """Convert the placement of a region or camera over time to the form that recipes have, with keys.
 
     Args:
         moving: The region or camera.
-        fixed: As for `_keys`.
+        fixed: Timeline frames that must be keys, with the ease that each must have.
         shown: As for `with_keys`.
+
+    Returns:
+        The placement, with frames counted as in a recipe. It has no keys if it never moves anything and `fixed` is
+        empty.
     """
     keys = []
     for frame, ease in _move_keys(moving, fixed, shown):
@@ -288,9 +323,14 @@ def _move_keys(moving: Subject, fixed: Mapping[float, Ease], shown: range) -> _E
 
 
 def _drawings(drawings: Drawings, frame: float) -> dict[float, list[np.ndarray]]:
-    """Return the drawings of a region as {frame where it was drawn: strokes (n, 2) as they lie at `frame`}.
+    """Return a region's drawings in fractions of the picture, without those before the first one that has strokes.
 
-    Drawings before the first one with strokes are left out.
+    Args:
+        drawings: The drawings.
+        frame: The timeline frame whose picture the fractions refer to: a strip's transform can move strokes over time.
+
+    Returns:
+        {timeline frame of a drawing: its strokes, (n, 2) each}. Keys of the region do not move them yet.
     """
     result: dict[float, list[np.ndarray]] = {}
     for index, number in enumerate(drawings.frames):
@@ -301,14 +341,20 @@ def _drawings(drawings: Drawings, frame: float) -> dict[float, list[np.ndarray]]
 
 
 def _keys(fits: _Fits, eases: Mapping[float, Ease], fixed: Mapping[float, Ease], shown: range) -> _Eased:
-    """Return frames and eases of keys that give the effect's values at every whole frame of the strip.
+    """Choose keys so that interpolation between them gives the effect's values at every whole frame shown.
+
+    It keeps the effect's own keys, and tries for each the three eases until one fits. Where none does, and outside the
+    keys where the value changes, it adds a linear key at each frame. Without `eases` and `fixed`, every frame is a key.
 
     Args:
-        fits: Tells whether a value is right: for the two keys' frames, a frame between them, and the share 0 to 1 of
-            the way between the keys' values.
-        eases: The eases of the effect's own keys, by frame.
-        fixed: Frames that have to be keys, such as those of drawings, with the eases that they must have.
+        fits: fits(first, second, frame, share) tells whether a value interpolated between keys at the frames `first`
+            and `second` is right at `frame`. `share`, 0 to 1, is the share of the way between the two keys' values.
+        eases: The effect's own keys: {timeline frame: ease until the next key}. That ease is tried first.
+        fixed: Frames that must be keys, such as those of drawings: {timeline frame: the only ease that is tried}.
         shown: As for `with_keys`.
+
+    Returns:
+        The keys' timeline frames, ascending, with the ease from each key to the next. Frames may lie outside `shown`.
     """
     if not (frames := sorted(eases.keys() | fixed.keys())):
         return [(frame, "linear") for frame in shown]

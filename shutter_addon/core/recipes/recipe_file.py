@@ -26,10 +26,11 @@ if TYPE_CHECKING:
 
 
 def load(path: str | Path) -> model.Effect:
-    """Return the effect of the recipe in a JSON file.
+    """Read the effect from the JSON file of a recipe.
 
     Raises:
-        RecipeError: The file cannot be read, or breaks the format. The message begins with the path.
+        RecipeError: The file cannot be read, or is not a valid recipe, or the package cattrs is missing. The message
+            begins with the path.
     """
     try:
         return parse(_read(Path(path)))
@@ -42,11 +43,12 @@ def load(path: str | Path) -> model.Effect:
 
 
 def _read(path: Path) -> str:
-    """Return the text of a recipe's file.
+    """Read a recipe's file and return its text.
 
     Raises:
-        RecipeError: It is a pipe or a device, or too large.
-        OSError, ValueError: It cannot be read, or is not UTF-8.
+        RecipeError: The file is a pipe or a device, or larger than limits.MAX_BYTES.
+        OSError: The file cannot be read.
+        ValueError: The file is not UTF-8, or no file can have its name.
     """
     if path.exists() and not (path.is_file() or path.is_dir()):
         # Opening a pipe would wait forever, and a device has no end.
@@ -64,10 +66,11 @@ def _check_size(text: str | bytes) -> None:
 
 
 def parse(text: str) -> model.Effect:
-    """Return the effect of a recipe in JSON.
+    """Convert the JSON text of a recipe to an effect.
 
     Raises:
-        RecipeError: The text breaks the format. The message begins with the place, like `shutters[1].bars`.
+        RecipeError: The text is no valid recipe, or is for a newer version, or the package cattrs is missing. The
+            message about a fault begins with the fault's place, like `shutters[1].bars`, if it has one.
     """
     _check_size(text)
     try:
@@ -93,10 +96,12 @@ def parse(text: str) -> model.Effect:
 
 
 def dump(effect: model.Effect) -> str:
-    """Return an effect as the JSON text of a recipe, which `parse` reads. Fields that have no effect are left out.
+    """Convert an effect to the JSON text of a recipe, which `parse` reads.
+
+    Fields that do not count are left out, such as the softness of a shutter without a threshold.
 
     Args:
-        effect: With keyed or constant channels, as `parse` and key_fitting.with_keys return it.
+        effect: An effect whose channels are keyed or constant, such as the result of `parse` or key_fitting.with_keys.
     """
     text = json.dumps(records.recipe_of(effect), indent=1, ensure_ascii=False)
     # People edit these files: keep a list of numbers on one line. The pattern also matches strings, to skip them.
@@ -110,14 +115,16 @@ def _on_one_line(match: re.Match) -> str:
 
 
 def save(effect: model.Effect, path: str | Path) -> None:
-    """Write an effect as a recipe's file, whole or not at all.
+    """Write an effect to a file as a recipe.
+
+    If an error occurs, a file that was there stays as it was.
 
     Args:
-        effect: As for `dump`.
-        path: The file.
+        effect: An effect whose channels are keyed or constant, as for `dump`.
+        path: The file. It is replaced if it exists.
 
     Raises:
-        OSError: It cannot be written.
+        OSError: The file cannot be written.
     """
     with atomic_write.writing(Path(path)) as part:
         part.write_text(dump(effect), encoding="utf-8")
@@ -147,10 +154,18 @@ def _number(value: Any, _kind: Any) -> float:
 
 
 def _within(converter: Converter, value: Any, kind: Any) -> Any:
-    """Convert a number, text or list of the JSON whose type has a range (records.Within). This is a hook of cattrs.
+    """Convert a value of the JSON to a type that has a range, and check the range. This is a hook of cattrs.
+
+    Args:
+        converter: The converter that calls this hook.
+        value: The number, text or list. For texts and lists, the range is that of the length.
+        kind: The type, Annotated[type without the range, records.Within].
+
+    Returns:
+        The converted value.
 
     Raises:
-        ValueError: The number, or the length of the text or list, is out of the range.
+        ValueError: The number or length is out of the range, or a text has characters that names cannot have.
     """
     inner, (least, most, empty) = get_args(kind)
     made = converter.structure(value, inner)
@@ -167,9 +182,16 @@ def _within(converter: Converter, value: Any, kind: Any) -> Any:
 
 
 def _union(converter: Converter, value: Any, kind: Any) -> Any:
-    """Convert a value of the JSON that may have several types. This is a hook of cattrs.
+    """Convert a value of the JSON to one of the types of a union, such as `X | Y`. This is a hook of cattrs.
 
-    These are: a region of any kind; a number or its keys; strokes of one frame or of several; a value or null.
+    The type is chosen as follows: for a region, by its field `kind`; for null, None if the union has it; for a number
+    that can have keys, and for strokes of a subject at several frames, the type of keys if the JSON has a list of them;
+    otherwise the first type of the union.
+
+    Args:
+        converter: The converter that calls this hook.
+        value: The value of the JSON.
+        kind: The union.
     """
     first, *others = get_args(kind)
     if kind == records.AnyRegionRecord:
@@ -205,9 +227,17 @@ def _choice(value: Any, kind: Any) -> Any:
 
 
 def _items(converter: Converter, value: Any, kind: Any) -> list | tuple:
-    """Convert a list of the JSON to a list, or to a tuple whose items have one type. This is a hook of cattrs.
+    """Convert a list of the JSON to a list or a tuple, and stop at the first fault. This is a hook of cattrs.
 
-    Keys have to be in ascending order of their frames.
+    Args:
+        converter: The converter that calls this hook.
+        value: The value of the JSON.
+        kind: A type such as list[X], or tuple[X, X, …] whose items all have one type X. The number of items of a tuple
+            has to match.
+
+    Raises:
+        ValueError: The value is no list, or has the wrong number of items for a tuple.
+        cattrs.errors.IterableValidationError: An item is invalid, or keys are not in ascending order of their frames.
     """
     inner = get_args(kind)
     if not isinstance(value, list):
@@ -261,11 +291,11 @@ def _made_of(*origins: Any) -> Callable[[Any], bool]:
 
 @cache
 def _converter() -> Converter:
-    """Return the cattrs converter that makes records of a recipe's JSON.
+    """Make the cattrs converter that turns a recipe's JSON into records (dataclasses). It is made only once.
 
     Raises:
-        RecipeError: cattrs is missing. Blender brings it, but a Linux distribution's Blender may not. Effects render
-            without it.
+        RecipeError: cattrs is not installed. It comes with Blender, except with some Linux distributions' packages.
+            Only recipes need it: effects in Blender render without it.
     """
     try:
         import cattrs
@@ -331,13 +361,13 @@ def _require(condition: object, place: str, message: str) -> None:
 
 
 def check(recipe: Any) -> None:
-    """Check what the types of a recipe's record do not tell, such as names that refer to something.
+    """Check a recipe's record for faults that its types cannot find, such as names that refer to nothing.
 
     Args:
         recipe: A records.RecipeRecord.
 
     Raises:
-        RecipeError: It does not describe a valid effect.
+        RecipeError: The recipe is not valid. The message begins with the place of the fault, like `shutters[1].bars`.
     """
     _require(recipe.version > 1 or recipe.inbetween != "auto", "inbetween", 'recipes have "auto" from version 2 on')
     places: dict[str, int] = {}
@@ -356,12 +386,15 @@ def check(recipe: Any) -> None:
 
 
 def _check_bars(shutter: Any, window: int, place: str) -> None:
-    """Check the bars of a shutter's record at each key.
+    """Check the bars of a shutter: it has either bars or keys, each with `window` valid bars.
 
     Args:
-        shutter: The record.
-        window: The number of bars that the recipe has.
-        place: The shutter's place in the recipe, for messages.
+        shutter: The shutter's record.
+        window: The recipe's field `window`: how many bars each shutter must have.
+        place: The shutter's place in the recipe, like `shutters[1]`, for messages.
+
+    Raises:
+        RecipeError: A check fails.
     """
     _require((shutter.bars is None) != (not shutter.keys), place, "either bars or keys, one of the two")
     said = {f"{place}.keys[{k}].bars": key.bars for k, key in enumerate(shutter.keys)}

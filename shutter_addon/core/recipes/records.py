@@ -25,11 +25,11 @@ VERSION = 2  # the newest that is read; in version 1, bars counted moments betwe
 
 
 class Within(NamedTuple):
-    """The range of a number, or of the length of a text or a list.
+    """The range of a number, or of the length of a text or a list, for Annotated[type, Within(…)].
 
     Attributes:
-        least, most: The ends of the range, which are inside it.
-        empty: What the error says of an empty text or list that may not be empty.
+        least, most: The smallest and the largest allowed value.
+        empty: The error message for an empty text or list, if `least` forbids that.
     """
 
     least: float
@@ -53,12 +53,12 @@ Stroke = Annotated[list[Point], Within(1, math.inf, "empty: a stroke has at leas
 
 @dataclass(frozen=True)
 class ValueKey:
-    """A key of a number, in a recipe.
+    """A key of a number over time, in a recipe.
 
     Attributes:
-        frame: The frame.
-        value: The number.
-        ease: The ease until the next key.
+        frame: The timeline frame of the key; 1 is the strip's first.
+        value: The number at this frame.
+        ease: How the number changes from this key to the next one.
     """
 
     frame: Frame
@@ -68,11 +68,14 @@ class ValueKey:
 
 @cache
 def _keys(least: float, most: float, fewest: int = 0) -> Any:
-    """Return the type of a list of keys (ValueKey), for cattrs.
+    """Make the type of a list of ValueKeys with a range for their values, for cattrs.
 
     Args:
-        least, most: The range of the keys' values.
-        fewest: The least number of keys.
+        least, most: The smallest and the largest allowed value of a key.
+        fewest: How many keys there must be at least.
+
+    Returns:
+        A type Annotated[list[…], Within(…)].
     """
     value, count = ("value", Annotated[float, Within(least, most)]), Within(fewest, limits.MAX_KEYS, _NO_KEY)
     return Annotated[list[make_dataclass("ValueKey", [value], bases=(ValueKey,), frozen=True)], count]  # type: ignore[misc]
@@ -80,7 +83,13 @@ def _keys(least: float, most: float, fewest: int = 0) -> Any:
 
 @dataclass(frozen=True)
 class BarsKey:
-    """A key of a shutter's bars, in a recipe."""
+    """A key of a shutter's bars over time, in a recipe.
+
+    Attributes:
+        frame: The timeline frame of the key; 1 is the strip's first.
+        bars: The weights of the frames that the shutter exposes, one for each of the recipe's `window` frames.
+        ease: How the bars change from this key to the next one.
+    """
 
     frame: Frame
     bars: list[float]
@@ -89,12 +98,14 @@ class BarsKey:
 
 @dataclass(frozen=True)
 class MoveKey:
-    """A key of the placement of a region or the camera, in a recipe.
+    """A key of the placement of a region or the camera over time, in a recipe.
 
     Attributes:
-        location: How far it is moved, in fractions of the picture, y up.
-        rotation: Degrees counter-clockwise.
-        ease: The ease until the next key.
+        frame: The timeline frame of the key; 1 is the strip's first.
+        location: How far it is shifted: x as a fraction of the picture's width, y of its height, y up.
+        rotation: How far it is turned about its centre, in degrees counter-clockwise.
+        scale: The factor by which it is enlarged about its centre.
+        ease: How the placement changes from this key to the next one.
     """
 
     frame: Frame
@@ -106,7 +117,12 @@ class MoveKey:
 
 @dataclass(frozen=True)
 class StrokesKey:
-    """The strokes on a subject that are drawn at a frame, in a recipe."""
+    """Strokes drawn on a subject at one frame, in a recipe. They show what belongs to the subject or does not.
+
+    Attributes:
+        frame: The timeline frame at which they are drawn; 1 is the strip's first.
+        strokes: The strokes, each a list of points in fractions of the picture, y up.
+    """
 
     frame: Frame
     strokes: list[Stroke]
@@ -118,7 +134,12 @@ Strokes = list[Stroke] | Annotated[list[StrokesKey], _KEYS]  # of frame 1, or of
 
 @dataclass(frozen=True)
 class RegionKey(MoveKey):
-    """A key of a region's placement, in a recipe, which can also have a new drawing of the region."""
+    """A key of a region's placement over time, in a recipe, that can also have a new drawing of the region.
+
+    Attributes:
+        strokes: The strokes that are drawn at the key's frame, lists of points in fractions of the picture, y up; they
+            change gradually to those of the next drawing. None: the key only places the region.
+    """
 
     strokes: list[Stroke] | None = None
 
@@ -136,12 +157,14 @@ def _type_of(each: Field) -> Any:
 
 
 def _record(name: str, kinds: tuple[type, ...], **special: tuple[Any, Any]) -> type:
-    """Make the record class for a part of a recipe.
+    """Make the record class (a dataclass) for a part of a recipe, such as a shutter.
 
     Args:
         name: The class's name.
-        kinds: Classes of the model whose properties the record has; the first becomes its attribute `model`.
-        special: More fields: (type, default) by name. They replace properties of the same name.
+        kinds: Classes of the model. The record gets a field for each property they declare; its class attribute `model`
+            is the first of them.
+        special: Fields that the classes do not declare, or that replace declared ones: (type, default) by name. The
+            default MISSING makes a field required.
     """
     said: dict[str, Any] = {name: special[name] for name in ("version", "kind") if name in special}
     said |= {each.recipe: (_type_of(each), each.absent) for each in fields_of(*kinds).values() if each.recipe} | special
@@ -206,9 +229,12 @@ RecipeRecord: Any = _record(
 
 
 def effect_of(recipe: Any) -> model.Effect:
-    """Return the effect of a recipe's record, which has been checked. It needs the aspect of pictures, too.
+    """Convert a recipe's record to an effect.
 
-    Effect.for_picture adds that.
+    A recipe does not know the aspect of pictures. Call Effect.for_picture on the result to set it.
+
+    Args:
+        recipe: A RecipeRecord that recipe_file.check has checked.
     """
     options = Options(**_values(Options, recipe))
     order = {shutter.name: index for index, shutter in enumerate(recipe.shutters)}
@@ -231,9 +257,17 @@ def effect_of(recipe: Any) -> model.Effect:
 
 
 def _filmed(effect: model.Effect, options: Options) -> model.Effect:
-    """Convert an effect from a recipe of version 1, whose bars count moments, to one whose bars count filmed frames.
+    """Convert an effect from a recipe of version 1, whose bars counted moments, to bars that count filmed frames.
 
-    Moments are filmed frames, and those made between them.
+    Moments are filmed frames, and those that are made between them. Each filmed frame has Options.step moments.
+
+    Args:
+        effect: The effect as read from the recipe.
+        options: Its options, with `window` in moments.
+
+    Returns:
+        The converted effect. Its attribute `lost` is a warning if the new bars cannot look like the old ones, else
+        None.
     """
     steps, position, lost = int(options.step), options.position, []
     shutters = []
@@ -283,11 +317,12 @@ def _shutter(record: Any, follow: model.Subject | None) -> model.Shutter:
 
 
 def _moves(keys: list, *, drawn: bool = False) -> model.Moves:
-    """Convert the keys of a record to a placement over time.
+    """Convert the keys of a placement in a record to a placement over time.
 
     Args:
-        keys: MoveKeys.
-        drawn: The keys are there for their drawings. If none of them moves anything, there is no motion.
+        keys: MoveKeys or RegionKeys, by ascending frame.
+        drawn: Whether the keys may be there only for their drawings, as for subjects. If none of them moves anything,
+            the placement is then keyless, which means that nothing moves.
     """
     placed = [(key.frame, Placement(key.location, key.rotation, key.scale), key.ease) for key in keys]
     if drawn and all(placement == Placement() for _frame, placement, _ease in placed):
@@ -313,9 +348,17 @@ def _region(record: Any, shutter: int) -> model.Region | model.MatteRegion:
 
 
 def drawn_in(record: Any) -> dict[str, list[Drawing]]:
-    """Return the drawings in a region's record, as lists by the model's attributes; {} for mattes and ramps.
+    """Return what is drawn in a region's record, sorted by the attributes of the model's region.
 
     The field `strokes` of a scribble or an outline is its first drawing, unless its first key has strokes.
+
+    Args:
+        record: The region's record.
+
+    Returns:
+        Lists of (frame, strokes, ease until the next drawing) by attribute. "drawings" of a scribble or outline are its
+        drawings. A subject has three lists: "drawings", the strokes on it; "nots", those on what does not belong to it;
+        "outlines", the outlines drawn around it at keys. A matte or ramp has none: {}.
     """
     drawn = [(key.frame, key.strokes, key.ease) for key in record.keys if getattr(key, "strokes", None) is not None]
     if isinstance(record, SubjectRecord):
@@ -343,10 +386,10 @@ def _drawings(name: str, drawn: list[Drawing]) -> model.Drawings:
 
 
 def recipe_of(effect: model.Effect) -> dict[str, Any]:
-    """Return an effect as the JSON object of a recipe; the inverse of `effect_of`.
+    """Convert an effect to the JSON object of a recipe, which RecipeRecord and `effect_of` turn into the effect again.
 
     Args:
-        effect: With keyed or constant channels, and shutters whose names are unique.
+        effect: An effect whose channels are keyed or constant, and whose shutters have unique names.
     """
     options, names = effect.options.at(1), [shutter.name for shutter in effect.shutters]
     said = {"version": VERSION} | _words(Options, options) | _words(model.Effect, effect)
@@ -361,11 +404,14 @@ def recipe_of(effect: model.Effect) -> dict[str, Any]:
 
 
 def _words(kind: type, part: Any) -> dict[str, Any]:
-    """Return a recipe's fields for the properties of a class; the inverse of `_values`.
+    """Return the declared properties of a part of an effect as fields of a recipe: {name in the recipe: JSON value}.
+
+    A property that recipes write only when needed (Field.told) is left out if it has its default value.
 
     Args:
-        kind: The class of the model.
-        part: An object with these properties.
+        kind: The class of the model that declares the properties.
+        part: An object that has them as attributes: the effect, its options, a shutter, a region, its content or the
+            camera.
     """
     said = {}
     for name, each in fields_of(kind).items():
@@ -382,11 +428,11 @@ def _keyable(channel: Channel) -> Any:
 
 
 def _keys_of(channel: Keys, **columns: Iterable) -> list[dict[str, Any]]:
-    """Return the keys of a channel as JSON objects.
+    """Return the keys of a channel as JSON objects, with the fields `frame`, `ease` and those in `columns`.
 
     Args:
-        channel: The channel.
-        columns: The values of all keys, for each field besides frame and ease.
+        channel: The channel, which gives the frames and eases.
+        columns: For each other field's name, the values at all keys, in order.
     """
     rows = zip(channel.frames, channel.eases, *columns.values(), strict=True)
     return [dict(zip(("frame", "ease", *columns), row, strict=True)) for row in rows]

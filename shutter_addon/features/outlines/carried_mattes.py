@@ -58,8 +58,10 @@ class CarriedMattes(SourceWrapper):
 
         Args:
             source: The footage.
-            drawings: The outline's drawings: frames of the footage with the curves drawn there.
-            folder: Where to keep mattes. None: in a temporary folder.
+            drawings: The outline's drawings: pairs of a frame of the footage, from 0, and the curves drawn there.
+                Frames outside the footage are ignored.
+            folder: The folder in which a folder with this footage's mattes is made. If it is None or cannot be written
+                to, they are kept in a temporary folder.
         """
         super().__init__(source)
         self._shots = source if isinstance(source, ShotSource) else ShotSource(source)
@@ -70,7 +72,12 @@ class CarriedMattes(SourceWrapper):
         self._spec = ImageSpec(self.width, self.height, 1, "uint8")
 
     def read(self, index: int) -> np.ndarray:
-        """Return a frame's matte (height, width) float32, 0 to 1. If it is not kept yet, make it and those around it.
+        """Return a frame's matte, (height, width) float32, 0 to 1. Without a drawing near enough, it is empty.
+
+        If no file keeps the matte yet, this makes it and all mattes that are made together with it (`_span`).
+
+        Args:
+            index: The frame of the footage, from 0. Beyond the ends, the first or last frame counts.
 
         Raises:
             MediaError: A frame cannot be read, or the folder cannot be written to.
@@ -107,14 +114,15 @@ class CarriedMattes(SourceWrapper):
             return None
 
     def curves(self, index: int) -> outlines.Curves:
-        """Return the outline's curves at a frame, in fractions of the picture.
+        """Return the outline's curves at a frame of the footage, for example to draw them in a preview.
 
         Returns:
-            The drawing, if there is one at this frame. Otherwise the curves around the matte or, while no
-            matte is kept yet, curves that move straight from drawing to drawing.
+            Closed curves, each of points (x, y) in fractions of the picture, y up. If the frame has a drawing, its
+            curves. Otherwise the contours of the frame's matte or, if no file keeps that yet, curves interpolated
+            linearly between the nearest drawings.
 
         Raises:
-            MediaError: The matte cannot be read.
+            MediaError: OpenCV is missing, or the matte cannot be read.
         """
         if index in self._drawings:
             return self._drawings[index]
@@ -135,15 +143,15 @@ class CarriedMattes(SourceWrapper):
         return scribbles.between_strokes(before, behind, share, self.width / self.height)
 
     def _carried(self, index: int, first: int | None, last: int | None) -> np.ndarray | None:
-        """Make a frame's matte and those that are made together with it, and write their files.
+        """Make a frame's matte and those that are made together with it (`_span`), and write each to a file.
 
         Args:
-            index: The frame.
-            first: The nearest frame before it with a drawing; None: there is none.
-            last: The nearest one after it; None: there is none.
+            index: The frame of the footage.
+            first: The nearest frame with a drawing at or before it; None: there is none near enough.
+            last: The nearest one at or after it; None: there is none near enough.
 
         Returns:
-            The frame's matte, (H, W) uint8.
+            The frame's matte, (H, W) uint8; None: it was not among those made.
         """
         matte = None
         for made in self._made(index, *self._in_shot(index, first, last)):
@@ -154,17 +162,18 @@ class CarriedMattes(SourceWrapper):
 
     @contextmanager
     def _claimed(self, index: int, first: int | None, last: int | None) -> Iterator[np.ndarray | None]:
-        """Keep other processes from making the mattes between two drawings, within a `with` block.
+        """Keep other processes from making the same mattes, within a `with` block.
 
-        If one makes them now, wait for it first. The wait ends early when the frame's matte is there.
+        If another process is making mattes from the same drawings, this first waits until it ends, or until it has made
+        the matte of this frame. A process without a sign of life for _PATIENCE seconds counts as ended.
 
         Args:
             index: The frame whose matte is wanted.
-            first: The frame of the drawing before it; None: there is none.
-            last: The frame of the drawing after it; None: there is none.
+            first, last: The frames with the drawings or strokes that the matte is made from; None: there is only the
+                other.
 
         Yields:
-            The frame's matte, (H, W) uint8, if another process has made it, else None.
+            The frame's matte, (H, W) uint8, if a file keeps it by now, else None: then the block has to make it.
 
         Raises:
             MediaError: The folder cannot be written to.
@@ -200,10 +209,13 @@ class CarriedMattes(SourceWrapper):
     def _made(self, index: int, first: int | None, last: int | None) -> Iterator[carrying.Carried]:
         """Make the matte of a frame and those made together with it (`_span`), and yield them.
 
+        They are in order of time or, before the only drawing, in the opposite order. A frame with a drawing is made
+        alone, and so is the empty matte of a frame whose shot has no drawing near enough.
+
         Args:
-            index: The frame.
-            first: The frame of the drawing before it, in the same shot; None: there is none.
-            last: The frame of the drawing after it, in the same shot; None: there is none.
+            index: The frame of the footage.
+            first: The nearest frame with a drawing at or before it, in the same shot; None: there is none.
+            last: The nearest frame with a drawing at or after it, in the same shot; None: there is none.
         """
         if first is None and last is None:  # kept as well: else it would be lacking again and again
             yield carrying.Carried(index, np.zeros((self.height, self.width), np.uint8), confidence=1.0)
@@ -220,15 +232,17 @@ class CarriedMattes(SourceWrapper):
             yield from self._fading(list(carried) if before else list(carried)[::-1])
 
     def _span(self, index: int, first: int | None, last: int | None) -> range:
-        """Return the frames whose mattes are made together with a frame's, all in its shot.
+        """Return the frames whose mattes are made together with a frame's matte.
 
-        Between two drawings, those are all frames there. Beyond the only drawing, they are one or more blocks of BLOCK
-        frames from the drawing on, up to carrying.FARTHEST frames.
+        Between two drawings, these are all frames between them. With a drawing on one side only, they begin next to the
+        drawing and go on as far as the frame, rounded up to a multiple of BLOCK frames. They end early after
+        carrying.FARTHEST frames, at a cut, or at an end of the footage.
 
         Args:
-            index: The frame.
-            first: The frame of the drawing before it; None: there is none.
-            last: The frame of the drawing after it; None: there is none.
+            index: The frame, which has no drawing itself.
+            first: The nearest frame before it with a drawing, in the same shot; None: there is none.
+            last: The nearest frame after it with a drawing, in the same shot; None: there is none, but then there is
+                `first`.
         """
         if first is not None and last is not None:
             return range(first + 1, last)
@@ -240,7 +254,10 @@ class CarriedMattes(SourceWrapper):
         return range(max(start, self._shots.around(index, start, last).start), last)
 
     def _fading(self, carried: list[carrying.Carried]) -> Iterator[carrying.Carried]:
-        """Yield mattes beyond the only drawing. They fade out over FADE frames once the confidence is below TRUSTED.
+        """Yield the mattes on one side of a lone drawing, faded out where tracking is no longer sure.
+
+        At the first matte with a confidence below TRUSTED, the fade begins. It takes FADE frames; all later mattes are
+        empty.
 
         Args:
             carried: The mattes, the nearest to the drawing first.
@@ -285,10 +302,14 @@ class CarriedMattes(SourceWrapper):
 
 @cache
 def _writable(parent: Path | None, name: str) -> Path:
-    """Return a folder for mattes: in the parent or, if that is None or cannot be written to, in a temporary one.
+    """Return the path of a folder for mattes, which need not exist yet. The answer is cached.
 
     Args:
-        name: The folder's name.
+        parent: The folder that shall contain it. If it is None or cannot be written to, a temporary folder does.
+        name: The name of the folder for mattes.
+
+    Raises:
+        MediaError: A temporary folder is needed and cannot be made.
     """
     if parent is not None:
         folder = parent / name

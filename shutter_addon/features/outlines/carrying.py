@@ -61,11 +61,11 @@ Places = np.ndarray  # (h, w, 2) float32, x and y in pixels of the working pictu
 
 @dataclass(frozen=True)
 class Drawing:
-    """An outline as it was drawn at one frame.
+    """An outline as the user drew it at one frame.
 
     Attributes:
         frame: Frame of the footage.
-        cover: How much of each pixel of the working picture lies inside it, (h, w) float32, 0 to 1.
+        cover: Which share of each pixel of the working picture lies inside the outline, (h, w) float32, 0 to 1.
     """
 
     frame: int
@@ -92,24 +92,26 @@ Frames = Callable[[int], np.ndarray]
 
 
 def working_size(width: int, height: int) -> tuple[int, int]:
-    """Return the width and height in pixels of the working picture for a picture of this size.
+    """Return the width and height of the working picture for a picture of this size, all in pixels.
 
-    Optical flow is found in the working picture, whose longer side has at most WORKING pixels.
+    The working picture is the picture reduced so that its longer side has at most WORKING pixels. Optical flow is found
+    in it. No side is reduced below SLIM pixels.
     """
     scale = min(1.0, WORKING / max(width, height))
     return max(round(width * scale), min(width, SLIM)), max(round(height * scale), min(height, SLIM))
 
 
 def carried(frames: Frames, first: Drawing | None, last: Drawing | None, span: range) -> Iterator[Carried]:
-    """Yield the mattes of the frames of a span, in order.
+    """Make the mattes of successive frames from the drawings around them, and yield them in order.
 
-    This reads the frames twice, from first to last. It keeps flow and colors of the working picture for each frame.
+    First, all frames from drawing to drawing are read, and the optical flow and colors of their working pictures are
+    held in memory. Then the frames of the span are read again, one for each matte.
 
     Args:
-        frames: Reads a frame.
-        first: The drawing before the span. None: there is none.
-        last: The drawing after the span. None: there is none.
-        span: The frames. Without any drawing, nothing is yielded.
+        frames: A function that reads a frame of the footage as displayed, (H, W, 3) uint8.
+        first: The drawing at a frame before the span. None: there is none.
+        last: The drawing at a frame after the span. None: there is none. Without any drawing, nothing is yielded.
+        span: The frames whose mattes are wanted, without those of the drawings.
     """
     ends = [each for each in (first, last) if each is not None]
     if not span or not ends:
@@ -138,11 +140,14 @@ def carried(frames: Frames, first: Drawing | None, last: Drawing | None, span: r
 
 
 def drawn(picture: np.ndarray, cover: np.ndarray) -> np.ndarray:
-    """Return the matte (H, W) uint8 of a drawing in its own frame, fitted to the picture's edges like carried mattes.
+    """Make the matte of a frame from the drawing at this very frame, fitted to the picture's edges.
 
     Args:
         picture: The frame, (H, W, 3) uint8.
-        cover: As in Drawing.
+        cover: The share of each pixel inside the drawing, (h, w) float32, as in Drawing.
+
+    Returns:
+        The matte, (H, W) uint8.
     """
     shown = lab(flow.resized(picture, cover.shape[::-1]))
     return flow.levels(refined(picture, _mixed([_votes(shown, shown, cover, box_around(cover, REACH))], [1.0])))
@@ -150,12 +155,12 @@ def drawn(picture: np.ndarray, cover: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Footage:
-    """The working pictures that were read so far, by frame of the footage.
+    """The working pictures that were read so far. All attributes have the frame of the footage as key.
 
     Attributes:
-        colors: Their colors, from `lab`.
+        colors: Their colors, (3, h, w) float32, from `lab`.
         greys: The same pictures in grey, (h, w) uint8, for optical flow.
-        moved: How many pixels each pixel has moved since the frame before, (h, w).
+        moved: How far the picture has moved at each pixel since the frame before, (h, w), a distance in pixels.
     """
 
     colors: dict[int, np.ndarray] = field(default_factory=dict)
@@ -173,13 +178,17 @@ class _Footage:
     def best(self, joined: Places, frame: int, end: Drawing) -> Places:
         """Find for each pixel of a frame the best matching place in a drawing's frame.
 
-        Several candidates are compared by color: joined flow, flow between the two frames alone, and the affine motions
-        of the background and of the subject. Joined flow counts unless another one is clearly better (BETTER).
+        Four candidates are compared by color: flow joined from frame to frame, flow directly between the two frames,
+        and the affine motions of what lies outside and inside the outline. Joined flow is used unless another candidate
+        leaves a difference of less than BETTER times as much.
 
         Args:
-            joined: The places that flow joined from frame to frame gives.
-            frame: The frame.
+            joined: For each pixel of the frame, its place in the drawing's frame by joined flow.
+            frame: The frame of the footage.
             end: The drawing.
+
+        Returns:
+            For each pixel of the frame, its place in the drawing's frame, (h, w, 2), x and y in pixels.
         """
         picture = self.colors[frame]
         cover = _at(end.cover, joined)
@@ -194,14 +203,17 @@ class _Footage:
 
 
 def stillness(moved: np.ndarray, colors: np.ndarray, before: np.ndarray) -> np.ndarray:
-    """Return which share of the last frame's matte each pixel keeps, (h, w), 0 to QUIET, so that mattes do not flicker.
+    """Return how much of the last frame's matte to mix into this frame's matte, so that mattes do not flicker.
 
-    Where nothing moves and colors stay, any difference between mattes is noise.
+    Where nothing moves and colors stay, any difference between the two mattes is noise.
 
     Args:
-        moved: How many pixels each pixel has moved since the frame before, (h, w).
-        colors: The frame's colors, from `lab`.
+        moved: How far each pixel has moved since the frame before, (h, w), in pixels.
+        colors: The frame's colors, (3, h, w), from `lab`.
         before: The colors of the frame before.
+
+    Returns:
+        The share at each pixel, (h, w): 0 where something moves or changes, up to QUIET where all is still.
     """
     still = np.clip(1.5 - moved / np.float32(STILL), 0, 1)
     differ = apart(colors, before)
@@ -215,11 +227,14 @@ def apart(picture: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 
 def affine(places: Places, where: np.ndarray) -> Places:
-    """Fit an affine motion to the places in an area, and return the places that it gives in the whole picture.
+    """Fit one affine motion to the optical flow in an area, and return the places that it gives in the whole picture.
 
     Args:
-        places: The matching places that flow gives.
-        where: The area, bool (h, w). If it is too small, `places` is returned.
+        places: For each pixel, its matching place in another frame, by flow: (h, w, 2), x and y in pixels.
+        where: The area, (h, w) bool.
+
+    Returns:
+        Places like `places`, by the affine motion; `places` itself if the area is too small or no motion fits.
     """
     grid = flow.grid(*where.shape)
     chosen = np.flatnonzero(where[::THIN, ::THIN])
@@ -233,17 +248,20 @@ def affine(places: Places, where: np.ndarray) -> Places:
 def _joined(
     small: Frames, footage: _Footage, reading: range, first: Drawing | None, last: Drawing | None
 ) -> dict[tuple[int, int], Places]:
-    """Join optical flow from frame to frame, and add the frames to `footage`.
+    """Join optical flow from frame to frame, so that it leads from each frame to the frames of the drawings.
+
+    This reads all frames once, and adds them to `footage`.
 
     Args:
-        small: Reads a frame as working picture.
-        footage: Gets the working pictures.
-        reading: The frames, including those of the drawings.
-        first: The drawing before; None: there is none.
-        last: The drawing after; None: there is none.
+        small: A function that reads a frame as working picture, (h, w, 3) uint8.
+        footage: The working pictures are added here, and how far each pixel has moved.
+        reading: The frames to read, including those of the drawings.
+        first: The drawing at the first of these frames; None: there is none.
+        last: The drawing at the last of these frames; None: there is none.
 
     Returns:
-        {(a drawing's frame, frame): the place in the drawing's frame that matches each pixel of the frame}.
+        By (a drawing's frame, another frame): for each pixel of the other frame, its matching place in the drawing's
+        frame.
     """
     places: dict[tuple[int, int], Places] = {}
     forth: dict[int, Places] = {}
@@ -271,13 +289,20 @@ Votes = tuple[np.ndarray, np.ndarray]  # per pixel, (h, w) each: the sum of vote
 
 
 def _votes(shown: np.ndarray, colors: np.ndarray, cover: np.ndarray, box: Box | None) -> Votes:
-    """Return votes on whether each pixel of a frame lies inside the outline.
+    """Let places around each pixel's match in a drawing's frame vote on whether the pixel lies inside the outline.
+
+    The match is the place in the drawing's frame that shows the same. A vote weighs more the nearer its place is to
+    that, and the more alike the colors around the place and the pixel are.
 
     Args:
-        shown: The frame's colors, from `lab`.
-        colors: The colors of the drawing's frame, moved to their matching places in this frame.
-        cover: The drawing's cover, moved in the same way.
-        box: Where pixels may lie inside. None: nowhere.
+        shown: The frame's colors, (3, h, w), from `lab`.
+        colors: The colors of the drawing's frame, each moved to the pixel of this frame that it matches.
+        cover: The drawing's cover, (h, w), moved in the same way.
+        box: The rows and columns that are examined. All pixels outside count as outside the outline. None: all pixels
+            do.
+
+    Returns:
+        For each pixel, the sum of the votes for "inside", and the sum of all votes, (h, w) each.
     """
     inside = np.zeros_like(cover)
     if box is None:
@@ -303,11 +328,11 @@ def _votes(shown: np.ndarray, colors: np.ndarray, cover: np.ndarray, box: Box | 
 
 
 def _mixed(sides: list[Votes], weights: list[float]) -> np.ndarray:
-    """Return the share of votes for "inside" at each pixel, (h, w), 0 to 1.
+    """Join the votes from one or two drawings: return the share of votes for "inside" at each pixel, (h, w), 0 to 1.
 
     Args:
-        sides: The votes from each drawing.
-        weights: The weight of each drawing.
+        sides: The votes from each drawing (`_votes`).
+        weights: The weight of each drawing's votes, more for the nearer drawing. They add up to 1.
     """
     shares = np.array(weights, np.float32)
     inside, total = (np.tensordot(shares, [side[part] for side in sides], axes=1) for part in (0, 1))
@@ -317,11 +342,12 @@ def _mixed(sides: list[Votes], weights: list[float]) -> np.ndarray:
 def _confidence(share: np.ndarray, sides: list[Votes]) -> float:
     """Return how sure a matte is, 0 to 1.
 
-    It is surer the more the subject looks as in one of the drawings, and the more two drawings agree on the matte.
+    It is surer the more the subject looks as in one of the drawings, and the more two drawings agree on the matte. An
+    empty matte has confidence 1 if it is made from two drawings, 0 if from one.
 
     Args:
-        share: From `_mixed`.
-        sides: The votes from each drawing.
+        share: The share of votes for "inside", (h, w), from `_mixed`.
+        sides: The votes from each drawing (`_votes`).
     """
     inside = share > INSIDE
     if not inside.any():
@@ -334,14 +360,15 @@ def _confidence(share: np.ndarray, sides: list[Votes]) -> float:
 
 
 def refined(picture: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Make a matte of votes, and fit it to the edges and colors of the whole picture (guided filter, soft edges).
+    """Make a matte from votes, and fit it to the edges and colors of the picture in full size.
 
     Args:
-        picture: (H, W, 3) uint8.
-        share: The share of votes for "inside" in the working picture, (h, w).
+        picture: The frame, (H, W, 3) uint8.
+        share: The share of votes for "inside" at each pixel of the working picture, (h, w), 0 to 1. From about INSIDE
+            on, a pixel counts as inside.
 
     Returns:
-        The matte, (H, W) float32, 0 to 1.
+        The matte, (H, W) float32, 0 to 1, with soft edges where the picture has them.
     """
     scale = picture.shape[1] / share.shape[1]
     coarse = int(scale)
@@ -366,16 +393,19 @@ _LIGHT = (255 * to_linear(np.arange(256) / 255)).astype(np.float32)
 
 
 def _explained(light: np.ndarray, values: np.ndarray, radius: int, coarse: int) -> np.ndarray:
-    """Replace a matte by a linear function of the colors around each pixel, where that function fits.
+    """Make a matte's edges as soft as the picture's: replace it by a linear function of the colors where one fits.
+
+    The function is fitted around each pixel. Where it explains the matte badly, the matte stays; in between, both are
+    mixed (DOUBTED, BELIEVED).
 
     Args:
         light: The picture in linear light, (h, w, 3) float32, 0 to 255.
         values: The matte, (h, w), 0 to 1.
         radius: How far around each pixel the function is fitted, in pixels.
-        coarse: Fit the function in a picture smaller by this factor.
+        coarse: The function is fitted in a picture that is smaller by this factor, which is quicker.
 
     Returns:
-        The new matte, (h, w).
+        The new matte, (h, w), 0 to 1.
     """
     found = cv2.ximgproc.guidedFilter(light, values, round(radius / coarse), EXACT * 255**2, scale=1 / coarse)
 
@@ -396,11 +426,14 @@ def lab(picture: np.ndarray) -> np.ndarray:
 
 
 def _at(values: np.ndarray, places: Places) -> np.ndarray:
-    """Look up a picture's values at some places, between its pixels, too. Beyond the picture, its edge repeats.
+    """Look up a picture's values at fractional positions, by linear interpolation. Outside, the picture's edge repeats.
 
     Args:
-        values: (h, w), (h, w, 2) or planes (3, h, w).
-        places: x and y in pixels for each pixel of the result.
+        values: The picture: (h, w), (h, w, 2), or three planes (3, h, w).
+        places: The positions, (h, w, 2), x and y in pixels, one for each pixel of the result.
+
+    Returns:
+        The values, in a shape like that of `values`.
     """
     if values.ndim == 3 and values.shape[0] == 3:
         return np.stack([_at(plane, places) for plane in values])

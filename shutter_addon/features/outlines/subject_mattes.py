@@ -59,12 +59,12 @@ _INPUT = re.compile(r"// <Input> CV_32FC1 \[1 x 3 x (\d+) x (\d+)\]")  # of Open
 
 @dataclass(frozen=True)
 class Found:
-    """A subject that was found in a picture.
+    """A subject that was found in a working picture of h × w pixels.
 
     Attributes:
-        share: (h, w) float32, 0 to 1: how sure each pixel belongs to it.
-        excluded: (h, w) float32, 0 to 1: what strokes have marked as not belonging to it.
-        confidence: How sure the whole is, 0 to 1.
+        share: How sure it is that each pixel belongs to the subject, (h, w) float32, 0 to 1.
+        excluded: How far strokes have marked each pixel as not belonging to the subject, (h, w) float32, 0 to 1.
+        confidence: How sure the find as a whole is, 0 to 1.
     """
 
     share: np.ndarray
@@ -79,7 +79,7 @@ class Network:
         """Read a network from an ONNX file.
 
         Raises:
-            MediaError: The file is missing, damaged, or another kind of network.
+            MediaError: The file is missing or damaged, or its network does not take one picture.
         """
         self._name = path.name
         try:
@@ -94,15 +94,17 @@ class Network:
         self._height, self._width = map(int, sizes[0])
 
     def answer(self, picture: np.ndarray, share: float = 1.0) -> np.ndarray:
-        """Return how sure the network is that each pixel of a picture belongs to the subject, (h, w) float32, 0 to 1.
+        """Return how sure the network is that each pixel belongs to the picture's subject, (h, w) float32.
+
+        Answers are scaled so that the least is 0 and the largest 1, even in a picture without a subject.
 
         Args:
-            picture: (h, w, 3) uint8.
-            share: Size of the picture that the network sees, as a fraction of its usual size; less is quicker and
-                coarser.
+            picture: The picture, (h, w, 3) uint8.
+            share: The size to which the picture is reduced for the network, as a fraction of the network's usual size.
+                A smaller one is quicker, and gives a coarser answer.
 
         Raises:
-            MediaError: The network is of another kind.
+            MediaError: The network does not take one picture and return one mask.
         """
         stopping.check()
         height, width = picture.shape[:2]
@@ -133,11 +135,11 @@ class Network:
 
 
 def refined(picture: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Make a matte from how sure pixels belong to a subject, and fit it to the edges of the whole picture.
+    """Make a matte of a subject, and fit it to the edges and colors of the picture in full size.
 
     Args:
-        picture: (H, W, 3) uint8.
-        share: (h, w), 0 to 1: how sure each pixel of the working picture is inside.
+        picture: The frame, (H, W, 3) uint8.
+        share: How sure it is that each pixel of the working picture belongs to the subject, (h, w), 0 to 1.
 
     Returns:
         The matte, (H, W) float32, 0 to 1.
@@ -147,10 +149,11 @@ def refined(picture: np.ndarray, share: np.ndarray) -> np.ndarray:
 
 
 def covered(strokes: Sequence[Any], picture: np.ndarray) -> np.ndarray:
-    """Return which pixels of a picture are covered by strokes, drawn with the width WIDTH, (h, w) bool.
+    """Return which pixels of a picture are covered by strokes of the width WIDTH, (h, w) bool.
 
     Args:
-        strokes: Points (n, 2) of each, in fractions of the picture.
+        strokes: The points of each stroke, (n, 2), in fractions of the picture.
+        picture: The picture, (h, w, 3), of which only the size counts.
     """
     points = tuple(np.asarray(stroke, np.float64) for stroke in strokes)
     height, breadth = picture.shape[:2]
@@ -158,12 +161,17 @@ def covered(strokes: Sequence[Any], picture: np.ndarray) -> np.ndarray:
 
 
 def found(network: Network, picture: np.ndarray, on: np.ndarray, off: np.ndarray) -> Found | None:
-    """Find the subject under strokes with the network; None: there is none.
+    """Find the subject under strokes with the network: near the strokes first and, if that is unsure, further around.
 
     Args:
-        picture: (h, w, 3) uint8.
-        on: (h, w) bool, the pixels that strokes on the subject cover.
-        off: (h, w) bool, the pixels that strokes beside the subject cover: what does not belong to it.
+        network: The network.
+        picture: The working picture, (h, w, 3) uint8.
+        on: The pixels that strokes on the subject cover, (h, w) bool.
+        off: The pixels that strokes on what does not belong to it cover, (h, w) bool. They are removed from the
+            subject.
+
+    Returns:
+        The subject. None: the network finds none, or `on` is empty.
     """
     if not on.any():
         return None
@@ -185,14 +193,15 @@ def found(network: Network, picture: np.ndarray, on: np.ndarray, off: np.ndarray
 
 
 def _sure(share: np.ndarray, on: np.ndarray, box: Box) -> float:
-    """Return how sure the network is of what it found under strokes, 0 to 1.
+    """Return how sure the network is of the subject that it found under strokes, 0 to 1.
 
-    It is 0 if the find covers too little of the strokes or nearly the whole picture, and less if the box cuts it off.
+    This is 0 if the subject covers less than TOUCHED of the strokes, or more than LARGEST of the picture. It is less if
+    an edge of the box cuts the subject off, which is then larger than what the network could see.
 
     Args:
-        share: The network's answer, (h, w).
-        on: (h, w) bool, the pixels that the strokes cover.
-        box: The part of the picture that the network saw.
+        share: The network's answer for the whole picture, (h, w), 0 outside the box.
+        on: The pixels that the strokes cover, (h, w) bool.
+        box: The rows and columns of the picture that the network saw.
     """
     inside = share > INSIDE
     if inside[on].mean() < TOUCHED or inside.mean() > LARGEST:
@@ -208,9 +217,10 @@ def _confidence(share: np.ndarray, sure: float, agrees: float = 1.0) -> float:
     """Return a subject's confidence, 0 to 1: less if the network is unsure, motion disagrees, or the subject is small.
 
     Args:
-        share: (h, w), how sure each pixel belongs to it.
+        share: How sure it is that each pixel belongs to the subject, (h, w), 0 to 1.
         sure: How sure the network is, 0 to 1.
-        agrees: How far the network agrees with what motion has carried here, 0 to 1.
+        agrees: How far the network's answer overlaps with the subject as motion carried it from the frame before, 0 to
+            1.
     """
     size = np.count_nonzero(share > INSIDE) / SMALL
     return float(_from(sure, UNSURE) * _from(agrees, UNLIKE) * min(size, 1.0) ** 0.5)
@@ -222,16 +232,21 @@ def _from(value: float, ends: tuple[float, float]) -> float:
 
 
 def without(subject: Found, picture: np.ndarray, on: np.ndarray, off: np.ndarray) -> Found:
-    """Remove from a subject what strokes (`off`) mark as not belonging to it, and return the rest.
+    """Remove from a subject what strokes mark as not belonging to it, and return the rest.
 
-    If these strokes touch a separate part that is smaller than the rest, all of that part is removed. Otherwise the
-    part is divided along the picture's edges between `off` and `on`, and the side of `off` is removed.
+    This concerns the connected parts of the subject that the strokes `off` touch. They are removed as a whole if they
+    are at most half of the subject and no stroke of `on` touches them. Otherwise they are divided along the picture's
+    edges, and the side of `off` is removed. If no part is touched, the subject is returned as it is.
 
     Args:
-        picture: (h, w, 3) uint8.
-        on: (h, w) bool, the pixels of strokes on the subject. If the touched part has none, what is far from `off`
-            counts.
-        off: (h, w) bool, the pixels of strokes on what the subject is not.
+        subject: The subject.
+        picture: The working picture, (h, w, 3) uint8.
+        on: The pixels that strokes on the subject cover, (h, w) bool. If none lies in the touched parts, pixels there
+            that are far from `off` stand for it when the parts are divided.
+        off: The pixels that strokes on what does not belong to the subject cover, (h, w) bool.
+
+    Returns:
+        The rest of the subject. What was removed is added to its `excluded`.
     """
     inside = subject.share > INSIDE
     _, parts = cv2.connectedComponents(inside.astype(np.uint8))
@@ -259,7 +274,9 @@ def _parts_on(answer: np.ndarray, on: np.ndarray) -> np.ndarray:
     """Return a network's answer (h, w) with only the connected parts that strokes touch; 0 elsewhere.
 
     Args:
-        on: (h, w) bool, the pixels that the strokes cover.
+        answer: How sure the network is of each pixel, (h, w), 0 to 1. A part is made of pixels above INSIDE, and keeps
+            its soft edge.
+        on: The pixels that the strokes cover, (h, w) bool.
     """
     _, parts = cv2.connectedComponents((answer > INSIDE).astype(np.uint8))
     return _alone(answer, np.isin(parts, np.setdiff1d(parts[on], [0])))
@@ -271,16 +288,18 @@ def _alone(answer: np.ndarray, keep: np.ndarray) -> np.ndarray:
 
 
 def followed(network: Network, before: np.ndarray, picture: np.ndarray, subject: Found) -> tuple[Found, np.ndarray]:
-    """Follow a subject to the next frame of a chain: carry it there by motion, and correct it by the network.
+    """Follow a subject to the next frame: carry it there by optical flow, and correct it by the network.
 
     Args:
-        before: The frame where the subject is known, (h, w, 3) uint8.
-        picture: The next frame, (h, w, 3) uint8.
+        network: The network.
+        before: Working picture of the frame where the subject is known, (h, w, 3) uint8.
+        picture: Working picture of the next frame (earlier in time if a chain goes backward), (h, w, 3) uint8.
         subject: The subject in the frame `before`.
 
     Returns:
-        The subject in the next frame, and which share of its matte in `before` each pixel keeps, (h, w), so that
-        mattes do not flicker (carrying.stillness).
+        The subject in the next frame. Its confidence is 0 if nothing of it is left in the picture.
+        Which share of the matte of `before` to mix into the next frame's matte at each pixel, (h, w), 0 to
+        carrying.QUIET, so that mattes do not flicker (carrying.stillness).
     """
     greys = [cv2.cvtColor(each, cv2.COLOR_RGB2GRAY) for each in (before, picture)]
     grid = flow.grid(*subject.share.shape)
@@ -312,12 +331,16 @@ def followed(network: Network, before: np.ndarray, picture: np.ndarray, subject:
 
 
 def _passing(places: carrying.Places, carried: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    """Return how sure it is, 0 to 1, that each pixel (h, w) moves with the background and not with the subject.
+    """Return how sure it is that each pixel moves with the background and not with the subject, (h, w), 0 to 1.
+
+    Things that pass the subject are recognized by this, so that they do not become a part of it. If too little of the
+    background is visible, all values are 0.
 
     Args:
-        places: Where each pixel was in the frame before.
-        carried: The subject's share, as motion has carried it here.
-        rest: How much a pixel's colors differ from those in its place before.
+        places: For each pixel, its place in the frame before, (h, w, 2), x and y in pixels.
+        carried: The subject's share at each pixel, (h, w), as motion has carried it here from the frame before.
+        rest: How much the colors around each pixel differ from those around its place in the frame before, (h, w), in
+            units of CIE Lab.
     """
     fits = [carrying.affine(places, it) for it in (carried < INSIDE, carried >= INSIDE)]
     if fits[0] is places:  # too little of the ground is seen
@@ -327,10 +350,11 @@ def _passing(places: carrying.Places, carried: np.ndarray, rest: np.ndarray) -> 
 
 
 def around(where: np.ndarray, room: float) -> Box:
-    """Return the box around an area (h, w) bool, with room on each side.
+    """Return the box (rows and columns) around an area, with room on each side, but within the picture.
 
     Args:
-        room: The room, as a fraction of the box's longer side.
+        where: The area, (h, w) bool, with at least one pixel.
+        room: The room as a fraction of the longer side of the area's box. It is at least LEAST_ROOM pixels.
     """
     area = where.astype(np.float32)
     tight = box_around(area, reach=0)
@@ -351,10 +375,13 @@ Strokes = Mapping[int, Sequence[Any]]
 
 @dataclass(frozen=True)
 class MarkedSubject:
-    """The user's strokes that say what a subject is.
+    """The user's strokes that tell what belongs to a subject and what does not.
+
+    Both attributes are made from sequences of arrays (n, 2), in fractions of the picture, which are converted to
+    outlines.Curves. Frames without strokes are dropped.
 
     Attributes:
-        strokes: On the subject, by frame of the footage. Sequences of arrays (n, 2) become outlines.Curves.
+        strokes: Strokes on the subject, by frame of the footage.
         nots: Strokes on what does not belong to it, by frame of the footage.
     """
 
@@ -373,10 +400,11 @@ class CarriedFile:
 
     Attributes:
         footage: The footage.
-        drawings: By ascending frame of the footage, the curves drawn there (core.model.outlines).
-        folder: Where mattes are kept. If it is None or cannot be written to, they are kept while this program runs.
-        subject: The strokes of a subject; None: an outline.
-        model: The file of the network that finds subjects.
+        drawings: Pairs of a frame of the footage and the curves drawn there (core.model.outlines), frames ascending.
+        folder: Where mattes are kept. If it is None or cannot be written to, they are in a temporary folder, which is
+            removed when this program ends.
+        subject: The strokes of a subject; None: it is an outline.
+        model: The file of the network that finds subjects. It is used only for a subject.
     """
 
     footage: SourceFile
@@ -421,7 +449,13 @@ class SubjectMattes(CarriedMattes):
         self._written: tuple[Path, np.ndarray] | None = None
 
     def read(self, index: int) -> np.ndarray:
-        """Return a frame's matte (height, width) float32, 0 to 1. If it is not kept yet, make it and its chain.
+        """Return a frame's matte, (height, width) float32, 0 to 1. Without any keyframes, it is empty.
+
+        If no file keeps the matte yet, this makes it and the missing ones on the way to it from its keyframe, which is
+        a frame with strokes or a drawing. Between two keyframes where both count, it does so from each.
+
+        Args:
+            index: The frame of the footage, from 0. Beyond the ends, the first or last frame counts.
 
         Raises:
             MediaError: A frame or the network cannot be read, or the folder cannot be written to.
@@ -444,14 +478,19 @@ class SubjectMattes(CarriedMattes):
         return sum(share * sure for _path, share, sure in sides)
 
     def _sides(self, index: int, *, makes: bool = False) -> list[tuple[Path, float, float]] | None:
-        """Return the files that make up a frame's matte, from the chains that begin at the keyframes on both sides.
+        """Return the files from which a frame's matte is mixed, one for the chain of each keyframe next to it.
+
+        Near a keyframe, only its chain counts. In the middle third between two keyframes, both chains do. The result is
+        empty if there are no keyframes.
 
         Args:
-            makes: Make what is missing.
+            index: The frame of the footage.
+            makes: Whether to make missing files.
 
         Returns:
-            For each chain the file, its share of the matte, 0 to 1, and its confidence: 0 to 1, or GONE behind a cut.
-            None: a file is missing.
+            For each chain, that of the nearer keyframe first: the file; its share of the matte (shares add up to 1, or
+            are all 0 if no chain shows the subject); and its confidence, 0 to 1, or GONE if a cut lies between keyframe
+            and frame. None: a file is missing.
         """
         ends = sorted({end for end in self._near(index) if end is not None}, key=lambda end: abs(end - index))
         span = sum(abs(end - index) for end in ends)
@@ -504,8 +543,13 @@ class SubjectMattes(CarriedMattes):
     def _first(self, frame: int) -> tuple[np.ndarray, np.ndarray, float]:
         """Make the matte of a keyframe (with strokes or a drawing), at which a chain of mattes begins.
 
+        A drawing is taken as it is. Under strokes, the network looks for the subject; if it finds none, the strokes
+        themselves become the matte, with confidence 0. From a frame that has only strokes on what the subject is not,
+        these are removed from the matte that other keyframes give.
+
         Returns:
-            The matte (H, W), what is excluded from it (h, w), and its confidence, 0 to 1.
+            The matte, (H, W) float32, 0 to 1; what strokes exclude from it, (h, w) float32 in the working picture, 0 to
+            1; and the confidence, 0 to 1.
         """
         picture, small = self._pictures(frame)
         nothing = np.zeros(small.shape[:2], np.float32)
@@ -520,15 +564,17 @@ class SubjectMattes(CarriedMattes):
         return refined(picture, what.share), what.excluded, what.confidence
 
     def _next(self, before: int, frame: int, end: int) -> tuple[np.ndarray, np.ndarray, float]:
-        """Make the matte of the next frame in a chain from the one before, which is kept.
+        """Make the matte of the next frame in a chain from the one of the frame before, which a file keeps.
 
         Args:
             before: The frame whose matte is kept.
-            frame: The next frame.
-            end: The keyframe with which the chain begins.
+            frame: The next frame of the chain, one later or earlier in time.
+            end: The keyframe at which the chain begins.
 
         Returns:
-            The matte (H, W), what is excluded from it (h, w), and its confidence: 0 to 1, or GONE behind a cut.
+            The matte, (H, W) float32, 0 to 1; what strokes exclude from it, carried along, (h, w) float32 in the
+            working picture, 0 to 1; and the confidence, 0 to 1. If a cut lies in between or earlier in the chain, the
+            matte is empty and the confidence is GONE.
         """
         path = self._path(before, end, None)
         matte, sure = self._kept(path), self._described(path)
@@ -574,10 +620,12 @@ class SubjectMattes(CarriedMattes):
 
 
 def mixed(mattes: list[tuple[np.ndarray, float]]) -> np.ndarray:
-    """Mix one or two mattes by a weighted mean (H, W), with steeper edges where the two differ.
+    """Mix one or two mattes by a weighted mean, (H, W), 0 to 1.
+
+    Where the two differ, contrast around one half is raised, so that their mean does not look half transparent.
 
     Args:
-        mattes: Each matte with its weight; weights add up to 1, or are all 0 for an empty result.
+        mattes: Each matte, (H, W), 0 to 1, with its weight. Weights add up to 1, or are all 0, for an empty result.
     """
     if len(mattes) == 1:
         return mattes[0][0] * np.float32(mattes[0][1] > 0)

@@ -49,10 +49,11 @@ def of_source(source: FrameSource, indices: Sequence[int], *, columns: bool = Fa
     Args:
         source: The footage.
         indices: Successive frames of it in one shot; FRAMES are enough.
-        columns: The sensor reads column by column, from the left.
+        columns: Whether the sensor reads column by column. The result is then positive if it begins at the left.
 
     Raises:
-        ReadoutError: It cannot be measured.
+        ReadoutError: There are too few frames or lines, they move too little, or no readout time explains how they
+            lean.
         MediaError: The frames cannot be read, or OpenCV is missing.
     """
     opencv.check("the readout is found by")
@@ -81,9 +82,10 @@ class _Edge:
     """A nearly upright edge that is followed from picture to picture.
 
     Attributes:
-        rows: The rows that it crosses.
-        polarity: 1 if it is lighter on the right, −1 on the left.
-        places: For each picture, its x in the middle row, and its lean: pixels to the right per row down.
+        rows: Numbers of the rows of pixels that it crosses, (n,), the same in all pictures.
+        polarity: 1 if the picture is lighter on its right, −1 if on its left.
+        places: Where it is in each picture, from the one where it was found to the last where it is visible: its x in
+            the middle of its rows, in pixels, and its lean, in pixels to the right per row down.
     """
 
     rows: np.ndarray
@@ -103,9 +105,12 @@ class _Edge:
 
 
 def _speeds(x: np.ndarray) -> np.ndarray:
-    """Return speeds (n,) in pixels per frame along the natural cubic spline through an edge's x (n,) in each frame.
+    """Return an edge's speed in each frame, (n,), in pixels per frame: the slope of a cubic spline through its x.
 
-    With shaking hands, differences of neighbors would be too small by a fifth.
+    Plain differences between the frames before and after would be too small by a fifth where hands shake.
+
+    Args:
+        x: The edge's x in each frame, (n,), in pixels.
     """
     of = 4 * np.eye(len(x)) + np.eye(len(x), k=1) + np.eye(len(x), k=-1)
     of[[0, -1], [0, -1]] = 2
@@ -136,11 +141,12 @@ def _steepness(picture: np.ndarray) -> np.ndarray:
 
 
 def _follow(edge: _Edge, vectors: np.ndarray, steepness: np.ndarray) -> bool:
-    """Follow an edge into the next picture, and add its place there. Return whether it is visible there.
+    """Follow an edge into the next picture. If it is visible there, add its place to `places`. Return whether it is.
 
     Args:
-        vectors: Horizontal optical flow from the last picture, (H, W), in pixels.
-        steepness: Horizontal gradient of the next picture.
+        edge: The edge, which was visible in the last picture.
+        vectors: Horizontal optical flow from the last picture to the next, (H, W), in pixels.
+        steepness: Horizontal gradient of the next picture, (H, W), from `_steepness`.
     """
     x, lean = edge.places[-1]
     columns = np.clip(np.rint(edge.at(x, lean)).astype(int), 0, vectors.shape[1] - 1)
@@ -151,10 +157,12 @@ def _follow(edge: _Edge, vectors: np.ndarray, steepness: np.ndarray) -> bool:
 
 
 def _new(seen: list[_Edge], picture: np.ndarray, steepness: np.ndarray) -> list[_Edge]:
-    """Find edges of a picture that do not coincide with those seen already, the longest first.
+    """Find edges of a picture that do not coincide with known ones, and return them, the longest first.
 
     Args:
-        steepness: The picture's horizontal gradient.
+        seen: The known edges that are visible in this picture. With the new ones, they are MOST at most.
+        picture: The picture in grey, (H, W) uint8.
+        steepness: Its horizontal gradient, (H, W), from `_steepness`.
     """
     new: list[_Edge] = []
     for x0, y0, x1, y1 in _segments(picture):
@@ -173,10 +181,14 @@ def _new(seen: list[_Edge], picture: np.ndarray, steepness: np.ndarray) -> list[
 
 
 def _is_same(edge: _Edge, place: tuple[float, float], other: _Edge) -> bool:
-    """Tell whether a new edge coincides with a known one of the same polarity in their common rows.
+    """Tell whether a new edge coincides with a known one.
+
+    Then they have the same polarity, and are less than 2 pixels apart in the middle of the rows that both cross.
 
     Args:
-        place: x and lean of the new edge, as in _Edge.places.
+        edge: The new edge.
+        place: Its x and lean, as in _Edge.places.
+        other: The known edge, at its last place.
     """
     if edge.polarity != other.polarity or not np.intersect1d(edge.rows, other.rows).size:
         return False
@@ -199,11 +211,16 @@ def _segments(picture: np.ndarray) -> np.ndarray:
 
 
 def _placed(edge: _Edge, expected: tuple[float, float], steepness: np.ndarray) -> tuple[float, float] | None:
-    """Find an edge near an expected place, and return its x in the middle row and its lean; None: it is not visible.
+    """Find an edge near an expected place.
 
     Args:
-        expected: x and lean, as in _Edge.places.
-        steepness: The picture's horizontal gradient.
+        edge: The edge, of which the rows and the polarity count.
+        expected: Its expected x and lean, as in _Edge.places.
+        steepness: The picture's horizontal gradient, (H, W), from `_steepness`.
+
+    Returns:
+        Its x and lean, as in _Edge.places. None: too few of its rows show it, they do not lie on a line, or its middle
+        is outside the picture.
     """
     place = expected
     for reach in (_REACH, _NEAR, _NEAR):
@@ -218,14 +235,16 @@ def _placed(edge: _Edge, expected: tuple[float, float], steepness: np.ndarray) -
 def _centres(
     edge: _Edge, place: tuple[float, float], steepness: np.ndarray, reach: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Find an edge in each of its rows, within `reach` pixels of a place.
+    """Find the exact x of an edge in each of its rows, near an expected place.
 
     Args:
-        place: x and lean, as in _Edge.places.
-        steepness: The picture's horizontal gradient.
+        edge: The edge, of which the rows and the polarity count.
+        place: Its expected x and lean, as in _Edge.places.
+        steepness: The picture's horizontal gradient, (H, W), from `_steepness`.
+        reach: How far from that place the edge is looked for, in pixels to the left and right.
 
     Returns:
-        Its x in each row (n,), and whether it was found there (n,).
+        Its x in each row, (n,), and whether it was found there, (n,) bool. Where it was not, x means nothing.
     """
     width = steepness.shape[1]
     middle = np.rint(edge.at(*place)).astype(int)
@@ -241,11 +260,12 @@ def _centres(
 
 
 def _line(rows: np.ndarray, centres: np.ndarray, is_there: np.ndarray) -> tuple[float, float]:
-    """Fit a line to an edge's places in its rows, robustly, and return its x in the middle row and its lean.
+    """Fit a straight line to an edge, robustly, and return its x in the middle row and its lean, as in _Edge.places.
 
     Args:
-        centres: x in each row (n,).
-        is_there: Whether each was found (n,).
+        rows: The edge's rows, (n,).
+        centres: Its x in each row, (n,), from `_centres`.
+        is_there: Whether it was found in each row, (n,) bool. Other rows do not count.
     """
     points = np.column_stack([centres, rows - rows.mean()])[is_there].astype(np.float32)
     right, down, x, y = cv2.fitLine(points, cv2.DIST_WELSCH, _ROUGH, 1e-3, 1e-4).ravel()
@@ -254,14 +274,16 @@ def _line(rows: np.ndarray, centres: np.ndarray, is_there: np.ndarray) -> tuple[
 
 
 def _fitted(samples: list[tuple[np.ndarray, np.ndarray]], height: int) -> float:
-    """Return the readout time in frames from speeds and leans, by a robust regression with a direction for each edge.
+    """Return the readout time in frames, by a robust regression of the leans of edges on their speeds.
+
+    The readout time is the common slope. Each edge has an intercept of its own, as it may lean even without motion.
 
     Args:
-        samples: Speeds in pixels per frame and leans in pixels per row of each edge.
-        height: Rows of the pictures.
+        samples: For each edge, its speeds in pixels per frame and its leans in pixels per row, (n,) each.
+        height: Number of rows of the pictures.
 
     Raises:
-        ReadoutError: The edges move too little, or do not agree on one readout time.
+        ReadoutError: Speeds change too little, or the edges do not agree on one readout time.
     """
     speeds, leans = (np.concatenate(part) for part in zip(*samples, strict=True))
     of = np.repeat(np.arange(len(samples)), [len(speed) for speed, _lean in samples])
@@ -285,9 +307,11 @@ def _fitted(samples: list[tuple[np.ndarray, np.ndarray]], height: int) -> float:
 
 
 def _without_mean(values: np.ndarray, weight: np.ndarray, of: np.ndarray) -> np.ndarray:
-    """Subtract from each value (n,) the weighted mean of all values of the same edge.
+    """Subtract from each value the weighted mean of all values of the same edge. Return the differences (n,).
 
     Args:
-        of: The edge's index for each value (n,).
+        values: Values of all edges, (n,).
+        weight: The weight of each value, (n,).
+        of: The index of the edge to which each value belongs, (n,).
     """
     return values - (np.bincount(of, weight * values) / np.bincount(of, weight))[of]

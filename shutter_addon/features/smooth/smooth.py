@@ -50,8 +50,9 @@ _FRAMES = MOST + 2  # frames that are kept: those that say what repeats
 class Repeats:
     """Finds frames of a source that repeat the one before, as in footage that was converted to a higher frame rate.
 
-    The answer for a frame depends only on MOST + 1 frames on each side. The source must keep the frames that it read
-    last. Usually only the neighbors are read, and more frames where something seems to repeat.
+    Whether a frame repeats depends only on MOST + 1 frames on each side. Frames are read from the source again and
+    again, so it must cache those that were read last. Usually only the neighbors are read; where something seems to
+    repeat, more.
     """
 
     def __init__(self, source: FrameSource) -> None:
@@ -60,10 +61,14 @@ class Repeats:
         self._changes: RecentValues[int, float] = RecentValues()
 
     def gap(self, index: int) -> tuple[int, int]:
-        """Return the two frames from which the pictures between a frame and the next are computed.
+        """Return the two frames from which the pictures between a frame and the next one are computed.
 
-        Usually these are the frame and the next one. Where frames repeat, they are the first of the equal frames and
-        the next different frame of the same shot.
+        Usually these are the frame and the next one. If the frame is one of several equal ones, they are the first of
+        these and the next different frame. More than MOST equal frames count as a still shot: there, and at cuts,
+        frames are not skipped.
+
+        Args:
+            index: The frame of the source.
         """
         first, stop = index, index + 1
         while stop - first <= MOST and self._change(first) <= REPEATED:
@@ -77,10 +82,12 @@ class Repeats:
         return (first, stop) if is_repeated else (index, index + 1)
 
     def _change(self, index: int) -> float:
-        """Return by how many levels of 255 a frame differs from the one before, where it differs most.
+        """Return by how many levels of 255 a frame differs from the one before, at the place where they differ most.
+
+        Both are compared in grey, much reduced and averaged over small patches.
 
         Returns:
-            Infinity if there is no frame before, or it belongs to another shot. NaN if a frame cannot be read.
+            Infinity at a cut, at frame 0, and at the index after the last frame. NaN if a frame cannot be read.
         """
         if index in (0, self._source.count):
             return math.inf
@@ -104,14 +111,14 @@ class Repeats:
 
 
 class SmoothSource(SourceWrapper):
-    """A source with the frames of another source and moments between them, which are pictures computed by optical flow.
+    """A source with the frames of another source, and between them moments: pictures computed by optical flow.
 
     Frame i of the other source is at index i · step. Where two frames have nothing in common, as at a cut, a moment
     between them is the nearer frame.
 
     Attributes:
         step: Indices from a frame of the other source to the next; step − 1 moments lie in between.
-        repeats: Whether repeated frames were replaced so far.
+        repeats: Whether any repeated frame was replaced by a moment so far.
     """
 
     def __init__(
@@ -121,9 +128,10 @@ class SmoothSource(SourceWrapper):
 
         Args:
             source: The source. `close` closes it.
-            step: Indices from one of its frames to the next.
-            vectors: Finds and stores optical flow. None: find it each time.
-            skip_repeats: Replace frames that repeat the one before by moments, evenly spaced between the others.
+            step: Indices from one of its frames to the next, 1 or more; step − 1 moments lie in between.
+            vectors: Finds and stores optical flow, so that it is found only once. None: find it whenever it is needed.
+            skip_repeats: Whether to replace frames that repeat the one before by moments, evenly spaced in time between
+                the frames that differ, so that motion does not stop.
         """
         self._recent = lru_cache(_FRAMES)(source.read)
         super().__init__(SourceWrapper(source, self._recent))
@@ -154,11 +162,11 @@ class SmoothSource(SourceWrapper):
         return self._moment((filmed, filmed + 1), number) if number else self._source.read(filmed)
 
     def _moment(self, pair: tuple[int, int], number: int) -> Decoded:
-        """Return the picture at a moment between two frames; the nearer frame if they have nothing in common.
+        """Return a moment between two frames; the nearer frame if they have nothing in common.
 
         Args:
-            pair: The two frames.
-            number: Which moment, counted from the first frame.
+            pair: The two frames of the source, neighbors unless repeated frames between them are skipped.
+            number: Indices from the first of the two frames to the moment, `step` for each frame of the source.
         """
         steps = (pair[1] - pair[0]) * self.step
 
@@ -176,16 +184,19 @@ class SmoothSource(SourceWrapper):
 
 
 def steps_for(source: FrameSource, smooth: int | str, window: int, *, skip_repeats: bool = False) -> int:
-    """Return how many steps lead from a frame of footage to the next, for an effect's option *Smooth*; 1: no moments.
+    """Return how many steps lead from a frame of footage to the next, for an effect's option *Smooth*.
+
+    With n steps, n − 1 moments lie in between.
 
     Args:
         source: The footage.
-        smooth: As frame_state.Options.step; "auto": as many as the fastest motion of a few pairs of frames needs.
-        window: Frames of the effect's shutters. These times the steps must not exceed shutters.MAX_WINDOW.
-        skip_repeats: As in SmoothSource.
+        smooth: The option: the number of steps, or "auto": as many as the fastest motion in a few pairs of frames
+            needs.
+        window: Frames in the window of the effect's shutters. window · steps must not exceed shutters.MAX_WINDOW.
+        skip_repeats: Whether repeated frames are replaced by moments, as in SmoothSource.
 
     Returns:
-        One of SMOOTH.
+        A number of SMOOTH; 1: no moments. It is less than `smooth` or than needed if the window allows no more.
     """
     most = max(count for count in SMOOTH if count * window <= max(MAX_WINDOW, window))
     if smooth != "auto":
@@ -226,15 +237,16 @@ class Moved(NamedTuple):
 
 
 def moved(source: FrameSource, index: int, other: int | None = None) -> Moved | None:
-    """Find how points move from a frame to another. Needs OpenCV.
+    """Find how points of the picture move from one frame to another. Needs OpenCV.
 
     Args:
-        source: Both frames are read from it.
+        source: The source of both frames.
         index: The first frame.
-        other: The other frame. None: the next one.
+        other: The other frame. None: the one after `index`.
 
     Returns:
-        None if too little of the motion is certain, as across a cut.
+        Where points are in both frames. None: too little of the motion is certain, as across a cut, or the picture is
+        too small.
 
     Raises:
         MediaError: A frame cannot be read.
@@ -260,12 +272,14 @@ def moved(source: FrameSource, index: int, other: int | None = None) -> Moved | 
 def step(moved: Moved, before: Similarity, after: Similarity) -> float:
     """Return how far the fastest part of a picture moves between two frames, relative to what the exposure follows.
 
-    The result is the distance, in heights of the picture, that the fastest _SHARE of the points exceed.
+    With an exposure that follows a subject, for example, the subject's own points count as still. The result is the
+    distance, in heights of the picture, that the fastest _SHARE of the points exceed.
 
     Args:
-        moved: The motion from one frame to the other.
-        before: Takes points of the shown picture to their places in the first frame, in heights of the picture.
-        after: Takes points of the shown picture to their places in the other frame.
+        moved: Where points are in the first and in the other frame.
+        before: Motion of what is followed from the shown picture to the first frame, in heights of the picture.
+        after: Motion of what is followed from the shown picture to the other frame. For nothing followed, both are
+            Similarity().
     """
     ways = after.inverse()(moved.after) - before.inverse()(moved.before)
     return float(np.quantile(np.abs(ways), 1 - _SHARE))

@@ -51,10 +51,13 @@ def run(arguments: Namespace) -> None:
 
 
 def _check_parent(film: baked_film.Film) -> None:
-    """Check that the Blender that started this bake still runs: it holds our standard input open.
+    """Check that the Blender that started this process still runs: if it ends, our standard input is closed.
+
+    Args:
+        film: The film being baked, for the message.
 
     Raises:
-        InterruptedRenderError: That Blender has ended.
+        InterruptedRenderError: That Blender has ended, so the bake has to end as well.
     """
     with suppress(OSError):  # nothing to read: it is still there
         if not os.read(0, 1):
@@ -62,10 +65,10 @@ def _check_parent(film: baked_film.Film) -> None:
 
 
 def _effect_strip(scene: Scene, name: str) -> tuple[PropertyGroup, Strip]:
-    """Return the effect of the strip with this name, and the strip.
+    """Find the effect strip with a name, and return its effect and the strip.
 
     Raises:
-        OutputError: The scene has no such effect strip.
+        OutputError: The scene has no strip with this name that shows an effect.
     """
     for strip in strips.effect_strips(scene):
         if strip.name == name and (effect := strips.effect_of(scene, strip.scene)) is not None:

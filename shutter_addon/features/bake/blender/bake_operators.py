@@ -37,9 +37,10 @@ class _Bake:
     """The state of baking in this Blender.
 
     Attributes:
-        running: The bake that is running; None: none.
-        stopped: The last bake that was stopped; it may still be finishing a frame.
-        failure: Identity of the effect whose bake failed last, and why.
+        running: The bake that is running in another process; None: none.
+        stopped: The bake that was stopped last, which may still be finishing a frame; None: none was.
+        failure: The identity of the effect whose bake failed last, and a sentence that says why; empty texts: none
+            failed since the last bake began.
     """
 
     running: baked_film.BakeJob | None = None
@@ -110,9 +111,10 @@ def unbake(self: Operator, _context: Context, _effect: PropertyGroup) -> None:
 
 
 def _look() -> float | None:
-    """Add the baked strip when the running bake has finished, or note why it failed.
+    """See whether the running bake has ended: if it made the film, add the baked strip, else note why it failed.
 
-    A timer of Blender calls this, again after the seconds that it returns; None: not again.
+    This waits while Blender renders or the user drags something. It is a timer of Blender: the result says after how
+    many seconds Blender calls it again, and None ends it.
     """
     if (job := _bake.running) is None:
         return None
@@ -199,12 +201,22 @@ def _ask_whether_stale() -> None:
 
 
 def add_strip(scene: Scene, strip: Strip, film: baked_film.Film) -> Strip:
-    """Add a baked strip that shows a finished film, above the effect strip, which is muted. Return the baked strip.
+    """Show a finished film in place of the effect: add a baked strip, mute the effect strip, and connect both.
 
-    It replaces the strip of an older bake.
+    A baked strip of an older bake is removed if it overlaps the effect strip. The baked strip lies above the effect
+    strip, unless other strips lie between them. Then it takes the effect strip's channel, so that these stay above it,
+    and the effect strip moves up to a free channel.
+
+    Args:
+        scene: The scene of the edit.
+        strip: The effect strip.
+        film: The film.
+
+    Returns:
+        The baked strip.
 
     Raises:
-        EffectError: No channel has room.
+        EffectError: No channel above the effect strip is free.
     """
     owner = strip.parent_meta() or scene.sequence_editor
     for older in [baked for baked in baked_of(scene, strip) if strips.overlap(baked, strip)]:
@@ -241,7 +253,7 @@ def add_strip(scene: Scene, strip: Strip, film: baked_film.Film) -> Strip:
 
 
 def _channel(scene: Scene, strip: Strip) -> int:
-    """Return the first unmuted channel above an effect strip that has room for a strip of its range.
+    """Return the lowest unmuted channel above an effect strip where no other strip overlaps its time.
 
     Raises:
         EffectError: There is none.
@@ -279,9 +291,15 @@ def effect_parts(scene: Scene, strip: Strip) -> list:
 
 
 def is_stale(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
-    """Tell whether an effect has changed since it was baked, or cannot be shown any more.
+    """Tell whether a bake of an effect is out of date: the effect has changed since, or cannot be rendered any more.
 
-    The answer is cached until something in the file changes.
+    It is also out of date if the effect strip shows frames that were not baked. The result is cached until something in
+    the file changes.
+
+    Args:
+        scene: The scene of the edit.
+        effect: The effect.
+        strip: The effect strip.
     """
     place = _place(scene, effect, strip)
     return revision.until_change("bake", place, lambda: effect_version.is_changed(scene, effect, strip))

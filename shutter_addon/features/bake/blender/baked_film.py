@@ -42,13 +42,13 @@ Picture = Callable[[int], np.ndarray]  # gives that of a frame
 
 @dataclass(frozen=True)
 class Film:
-    """The film that baking makes of an effect strip.
+    """What baking makes, or has made, of an effect strip: its frames and files.
 
     Attributes:
-        kind: "MOVIE" or "OPEN_EXR".
-        frames: Counted from the strip's origin (effect_version.frames_of).
-        version: effect_version.key of the effect.
-        place: The movie, or the folder of pictures, numbered from 1.
+        kind: "MOVIE" for one H.264 movie, "OPEN_EXR" for a folder of pictures.
+        frames: The frames that are baked. 0 is the first frame of the strip's untrimmed content.
+        version: A hash of everything that the pictures depend on, 16 hexadecimal digits (effect_version.key).
+        place: Path of the movie, or of the folder. The pictures in it are numbered from 1.
     """
 
     kind: Kind
@@ -78,14 +78,21 @@ class Film:
 
 
 def film_of(scene: Scene, effect: PropertyGroup, strip: Strip, kind: Kind, folder: Path | None = None) -> Film:
-    """Return the film that baking would make of an effect strip.
+    """Describe the film that baking would make of an effect strip, without making it.
+
+    Its name has the strip's name, and part of a hash of what the pictures depend on, so that a film of a changed effect
+    gets another name.
 
     Args:
+        scene: The scene of the edit.
+        effect: The effect of the strip.
+        strip: The effect strip.
         kind: "MOVIE" or "OPEN_EXR".
-        folder: Folder of the film; None: FOLDER beside the .blend file.
+        folder: The folder for the film. None: the folder virtual_shutter_baked beside the .blend file.
 
     Raises:
-        EffectError, MediaError: The strip cannot be baked.
+        EffectError, MediaError: The strip cannot be baked (see `_check`), or there is no `folder`, and the .blend file
+            was never saved.
     """
     _check(scene, effect, strip, kind)
     if not folder and not bpy.data.filepath:
@@ -100,11 +107,18 @@ def film_of(scene: Scene, effect: PropertyGroup, strip: Strip, kind: Kind, folde
 
 
 def _check(scene: Scene, effect: PropertyGroup, strip: Strip, kind: Kind) -> None:
-    """Check that a baked film would look like the effect strip.
+    """Check that the film would look like the effect strip.
+
+    Args:
+        scene: The scene of the edit.
+        effect: The effect of the strip.
+        strip: The effect strip.
+        kind: "MOVIE" or "OPEN_EXR".
 
     Raises:
-        EffectError: It would not, because of retiming, missing packages, colors or transparency.
-        MediaError: The source cannot be read.
+        EffectError: It would not. The strip is retimed, strobed or reversed. Or a movie cannot do it: the package av is
+            missing, Blender uses another color configuration, or the source is transparent or has light above white.
+        MediaError: The source of a movie cannot be read.
     """
     if getattr(strip, "retiming_keys", ()) or strip.strobe > 1 or strip.use_reverse_frames:
         raise EffectError(
@@ -127,14 +141,22 @@ def _check(scene: Scene, effect: PropertyGroup, strip: Strip, kind: Kind) -> Non
 
 
 def render(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film, report: Callable[[], object]) -> None:
-    """Render those frames of a film that are missing. Finished frames stay when it is stopped or fails.
+    """Render those frames of a film that are not finished yet.
+
+    If it ends early, finished frames stay and are not rendered again the next time. Of a movie, frames are kept in
+    parts of film_parts.LENGTH frames, so an unfinished part is rendered again.
 
     Args:
-        report: Called after each frame. It may raise to stop.
+        scene: The scene of the edit.
+        effect: The effect of the strip.
+        strip: The effect strip.
+        film: What to render (`film_of`).
+        report: Called after each frame, also after one that was finished before, unless the whole movie was. It may
+            raise an exception to stop.
 
     Raises:
         effect_source.FAULTS, OutputError, OSError: The film cannot be made.
-        InterruptedRenderError: It was stopped.
+        InterruptedRenderError: It was stopped by Ctrl-C or a signal.
     """
     if film.kind == "MOVIE" and film.is_finished():
         _remove_parts(film)
@@ -187,10 +209,13 @@ def _make_movie(film: Film, picture: Picture, fps: Fraction, report: Callable[[]
 
 
 def _prepare(place: Path) -> None:
-    """Make a folder for a film, and remove unfinished files that ended processes left there.
+    """Make a folder for a film if it is missing, and remove old temporary folders that killed processes left in it.
+
+    Args:
+        place: The folder.
 
     Raises:
-        OSError: It cannot be made, or is a link that somebody else may have made.
+        OSError: It cannot be made, or is a link, which could lead to files of other users.
     """
     own_folder(place)
     atomic_write.clear_up(place)
@@ -221,13 +246,13 @@ class BakeJob:
     """A bake that runs in a second Blender, which reads a copy of the edit.
 
     Attributes:
-        scene: session_uid of the edit's scene.
-        effect: Identity of the effect.
-        strip: Name of its strip.
-        film: The film that it makes.
-        copy: File of the edit's copy, which the process removes after reading it.
-        log: A temporary folder beside the film with the process's output.
-        process: The second Blender.
+        scene: The session_uid of the scene of the edit.
+        effect: Identity of the effect that is baked.
+        strip: Name of the effect strip.
+        film: The film that is made.
+        copy: Path of the copied .blend file, which the second Blender removes after reading it.
+        log: A temporary folder, beside the film, with the second Blender's output: the files "out" and "err".
+        process: The second Blender's process.
     """
 
     scene: int
@@ -267,10 +292,21 @@ class BakeJob:
 
 
 def start(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film) -> BakeJob:
-    """Begin to bake a film in a second Blender, and return the job.
+    """Start a second Blender that bakes a film, and return at once.
+
+    It works on a copy of the current edit, and ends when this process ends.
+
+    Args:
+        scene: The scene of the edit.
+        effect: The effect of the strip.
+        strip: The effect strip.
+        film: What to bake (`film_of`).
+
+    Returns:
+        The job, by which the bake can be watched and ended.
 
     Raises:
-        EffectError, OSError: It cannot begin.
+        EffectError, OSError: The bake cannot start.
     """
     edit = Path(bpy.data.filepath)
     film.place.parent.mkdir(parents=True, exist_ok=True)
@@ -295,9 +331,18 @@ def start(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film) -> Bake
 
 
 def _command(scene: Scene, strip: Strip, film: Film, copy: Path) -> list[str]:
-    """Return the command line that bakes a film of a copied edit in another process.
+    """Return the command line of the process that bakes a film from a copy of the edit.
 
     Options have the form --name=value, because names in the edit can begin with a dash.
+
+    Args:
+        scene: The scene of the edit.
+        strip: The effect strip.
+        film: What to bake.
+        copy: Path of the edit's copy.
+
+    Returns:
+        The program and its arguments.
     """
     program = [sys.executable, "-m", "shutter_addon"]  # with Blender as a library
     if bpy.app.binary_path:

@@ -29,7 +29,10 @@ def add(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> None:
-    """Join rendered frames in a folder to a movie, whole or not at all.
+    """Run the command `join`: make a movie of frames that were rendered to a folder. It is written whole or not at all.
+
+    Args:
+        arguments: The parsed command line (see `add`).
 
     Raises:
         OutputError, MediaError: Frames are missing, damaged, different or of another edit, or the movie cannot be
@@ -61,10 +64,17 @@ AT_ONCE = 1000  # pictures per strip: Blender copies all of them for each that i
 
 
 def _pictures(folder: Path, frames: range) -> list[Path]:
-    """Return the file of each frame in a folder, whose name is the frame's number.
+    """Find the picture file of each frame in a folder. The name of a file is the number of its frame, such as 0012.png.
+
+    Args:
+        folder: The folder.
+        frames: The frames that are needed.
+
+    Returns:
+        The files, in the order of `frames`.
 
     Raises:
-        OutputError: Some are missing, or exist twice.
+        OutputError: A frame is missing, or has two files.
         OSError: The folder cannot be read.
     """
     pictures: dict[int, Path] = {}
@@ -79,15 +89,19 @@ def _pictures(folder: Path, frames: range) -> list[Path]:
 
 
 def _common(paths: list[Path], looked: Callable, size: tuple[int, int], key: str) -> RenderedPicture:
-    """Read all pictures, check that they are whole and alike, and return the properties that they have in common.
+    """Read all pictures, check that they belong together, and return the properties that they share.
 
     Args:
-        looked: Called after each picture.
-        size: Width and height that they must have.
-        key: Key of the edit's version, which they must carry if they carry any.
+        paths: The pictures.
+        looked: Called after each picture has been read.
+        size: The (width, height) that all must have.
+        key: Key of the version of the edit. A picture whose metadata names a version must name this one.
+
+    Returns:
+        The properties, such as size, number of channels and sample type.
 
     Raises:
-        OutputError: A picture is damaged, unlike the first, or of another edit.
+        OutputError: A picture is damaged, differs from the first one, or has another size or version.
     """
     pool = threads.pool()
     first: RenderedPicture | None = None
@@ -114,15 +128,18 @@ def _described(picture: RenderedPicture) -> str:
 
 
 def _refuse_transparency(scene: Scene, paths: list[Path], first: RenderedPicture) -> None:
-    """Refuse transparent PNG files that a film rendered by Blender would show in other colors.
+    """Refuse PNG files with transparent pixels if the movie would show these in other colors.
 
-    Blender applies the view transform after laying a picture over black, but these colors have it already.
+    Blender lays a picture over black and then applies the view transform. But the colors of these files have had it
+    applied before, so this is wrong for any view transform other than Standard.
 
     Args:
-        first: What all pictures have in common.
+        scene: The scene of the edit, which has the view transform.
+        paths: The pictures. EXR files, and files without an alpha channel, pass.
+        first: The properties that all pictures have in common.
 
     Raises:
-        OutputError: A picture is such a file.
+        OutputError: A picture has a transparent pixel.
     """
     is_shown_otherwise = _shown(scene).view_settings.view_transform != "Standard"
     if paths[0].suffix == ".png" and first.channels in (2, 4) and is_shown_otherwise:
@@ -139,10 +156,17 @@ def _shown(scene: Scene) -> Scene | ImageFormatSettings:
 
 
 def _cover_edit(scene: Scene, paths: list[Path], first: RenderedPicture) -> None:
-    """Add strips with the rendered pictures above all others, so that the edit shows only these. Sounds stay.
+    """Add image strips with the rendered pictures above all other strips, so that only they are seen. Sounds stay.
+
+    A picture is repeated if the scene's frame step leaves out frames. The color management is set to suit the files.
 
     Args:
-        first: What all pictures have in common.
+        scene: The scene of the edit, whose range is to be covered.
+        paths: The pictures, in the order of frames.
+        first: The properties that all pictures have in common.
+
+    Raises:
+        OutputError: A strip lies in the uppermost channel, or the files are PNG and no view keeps their colors.
     """
     editor = scene.sequence_editor
     editor.display_stack(None)  # Blender renders the meta strip that was open when the file was saved
@@ -164,10 +188,20 @@ def _cover_edit(scene: Scene, paths: list[Path], first: RenderedPicture) -> None
 
 
 def _keep_colours(scene: Scene, suffix: str, first: RenderedPicture) -> str | None:
-    """Set the view so that it leaves the colors of PNG files unchanged, since their colors are final.
+    """For PNG files, set the scene's view so that the movie keeps their colors, which have the edit's view already.
+
+    For EXR files, change nothing: they are scene-linear and get the edit's view.
+
+    Args:
+        scene: The scene of the edit. 8-bit files also turn off its dither, since they have been dithered.
+        suffix: The suffix of the pictures, ".png" or ".exr".
+        first: The properties that all pictures have in common.
 
     Returns:
-        The color space of the files; None for EXR files, which are scene-linear and get the edit's view.
+        The color space to give to the files' strips; None for EXR files, for which Blender's own choice is right.
+
+    Raises:
+        OutputError: The color configuration has no view Standard, which PNG files need.
     """
     if suffix == ".exr":
         return None
@@ -184,12 +218,18 @@ def _keep_colours(scene: Scene, suffix: str, first: RenderedPicture) -> str | No
 
 
 def _set_output(scene: Scene, output: Path, size: tuple[int, int]) -> None:
-    """Set the scene's output to a movie, with the edit's own movie settings if it has some, else the command's.
+    """Set the scene to render to a movie file of the pictures' size, without burnt-in metadata.
 
-    The container follows the path's suffix. Burnt-in metadata, other sizes and other places are turned off.
+    If the edit's own output is a movie, its codec settings stay, and only the container follows the path's suffix.
+    Otherwise those of film_output.set_output are used.
 
     Args:
+        scene: The scene of the edit.
+        output: Path of the movie.
         size: Width and height of the pictures.
+
+    Raises:
+        OutputError: Blender cannot write there.
     """
     render = scene.render
     if render.image_settings.media_type == "VIDEO":

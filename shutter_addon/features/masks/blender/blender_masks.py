@@ -32,7 +32,8 @@ def still_mask(mask: Mask) -> masks.MaskShape:
     """Return the shape of a mask that does not move, as plain data.
 
     Raises:
-        EffectError: It moves, or a number is not usable.
+        EffectError: The mask has F-curves, shape keys or points with a parent, so it may move; or one of its numbers is
+            not finite, or larger than _FARTHEST.
     """
     points = (point for layer in mask.layers for spline in layer.splines for point in spline.points)
     is_keyed = fcurves.curves_under(mask, "") or any(map(_has_shape_keys, mask.layers))
@@ -43,10 +44,14 @@ def still_mask(mask: Mask) -> masks.MaskShape:
 
 
 def at_frames(mask: Mask, frames: Iterable[int]) -> Iterator[masks.MaskShape]:
-    """Yield the shape of a mask at each of these frames, as Blender evaluates it there.
+    """Yield the shape of a mask at each of these frames, as Blender evaluates it there: with all motion applied.
+
+    Args:
+        mask: The mask.
+        frames: Frames at which to evaluate the mask, counted as in the mask's own F-curves.
 
     Raises:
-        EffectError: A number is not usable.
+        EffectError: A number of the mask is not finite, or larger than _FARTHEST.
     """
     scene = bpy.data.scenes.new("mask")
     try:
@@ -58,9 +63,9 @@ def at_frames(mask: Mask, frames: Iterable[int]) -> Iterator[masks.MaskShape]:
 
 
 def _has_shape_keys(layer: MaskLayer) -> bool:
-    """Tell whether a mask's layer has shape keys, read from Blender's memory, since the API lacks them.
+    """Tell whether a layer of a mask has shape keys. Blender's API does not say so, so this reads Blender's memory.
 
-    False also where its memory cannot be read.
+    If the memory cannot be interpreted, return False.
     """
     with suppress(LayoutError):
         (ends,) = read(record("MaskLayer", ("ListBase splines_shapes", "2u8")), layer.as_pointer())
@@ -97,10 +102,14 @@ def _spline(mask: Mask, spline: MaskSpline) -> masks.MaskSpline:
 
 
 def _check(mask: Mask, values: ArrayLike) -> None:
-    """Check that numbers of a mask are finite and at most _FARTHEST from 0.
+    """Check that numbers of a mask, such as coordinates, weights or opacities, are finite and at most ±_FARTHEST.
+
+    Args:
+        mask: The mask, for the message.
+        values: The numbers.
 
     Raises:
-        EffectError: One is not.
+        EffectError: A number is not.
     """
     if not (np.abs(np.asarray(values, np.float64)) <= _FARTHEST).all():
         sentence = rpt_('mask "{mask}": a point, a feather or an opacity is not a usable number')
@@ -151,10 +160,16 @@ def outline_from_mask(self: Operator, _context: Context, effect: PropertyGroup) 
 
 
 def _where_motion_changes(shapes: dict[int, masks.MaskShape]) -> dict[int, masks.MaskShape]:
-    """Return the shapes at those frames where a mask's motion changes; in between, it moves evenly.
+    """Keep only the shapes that are needed to reproduce a mask's motion by linear interpolation between them.
+
+    A shape is dropped if the step from it to the next frame's shape equals the step from the previous one to it. The
+    last one is dropped if the mask stood still before it.
 
     Args:
-        shapes: The mask's shape at each frame.
+        shapes: The mask's shape at each frame, by ascending frame. All have the same points, apart from their places.
+
+    Returns:
+        The shapes that are kept, by frame.
     """
     steps = np.diff(np.array([_numbers(shape) for shape in shapes.values()]), axis=0)
     changes = np.abs(np.diff(steps, axis=0, prepend=1, append=0)).max(axis=1, initial=0)

@@ -26,17 +26,18 @@ TICK = 0.25  # seconds between two looks at the thread
 
 @dataclass
 class _Carrying:
-    """Mattes that a thread is making. The thread touches no bpy.
+    """A background thread that makes mattes of one outline or subject, and its progress. The thread touches no bpy.
 
     Attributes:
-        file: Makes and keeps them.
-        frames: Frames of the footage to make mattes for: drawn ones first, then those nearest to `middle`.
-        middle: A frame of the footage; None: the middle of the frames.
-        done: How many mattes are made.
-        told: How many were made when previews were last redrawn for them.
-        ended: Makes the thread end when it is set.
-        soon: How many of the frames are drawn. Once these are made, previews are redrawn.
-        future: Of the thread's end.
+        file: Makes the mattes and stores them.
+        frames: The frames of the footage, from 0, that need a matte. The thread takes those with a drawing first, then
+            the others by their distance to `middle`.
+        middle: The frame of the footage near which to begin. None: the middle one of `frames`.
+        done: How many mattes the thread has made.
+        told: What `done` was when previews were redrawn to show the frames with a drawing; 0: not yet.
+        ended: Set this to stop the thread.
+        soon: How many of `frames` have a drawing, at least 1. Previews are redrawn when that many mattes are made.
+        future: Is done when the thread has ended. Its result is None, or it raises the thread's exception.
     """
 
     file: CarriedFile
@@ -67,9 +68,10 @@ class _Mattes:
     """The mattes that previews lack.
 
     Attributes:
-        wanted: Frames of the footage that lack one, by file.
-        failed: Why mattes of a file could not be made.
-        carrying: Those that a thread is making now; None: none.
+        wanted: The frames of the footage whose mattes a preview lacked, by file. note_tracking clears it.
+        failed: Why the mattes of a file could not be made, as a sentence. They are not tried again until `carry` is
+            called.
+        carrying: The thread that makes mattes; None: none is running.
     """
 
     wanted: dict[CarriedFile, set[int]] = field(default_factory=dict)
@@ -87,11 +89,12 @@ def want_matte(file: CarriedFile, frame: int) -> None:
 
 
 def carry(file: CarriedFile, frames: list[int], middle: int | None = None) -> None:
-    """Begin to make mattes on a thread; it stops making others.
+    """Start a thread that makes mattes of an outline or subject. Stop the thread that makes others, if one is running.
 
     Args:
-        frames: Frames of the footage.
-        middle: The frame to begin at; None: the middle one.
+        file: Makes the mattes and stores them. If making its mattes failed before, it is tried again.
+        frames: The frames of the footage, from 0, that need a matte. The list is sorted in place.
+        middle: The frame near which to begin, after the frames that have a drawing. None: the middle one of `frames`.
     """
     stop()
     _mattes.failed.pop(file, None)
@@ -111,9 +114,12 @@ def progress() -> tuple[int, int] | None:
 
 
 def note_tracking(say: Callable[[str], None]) -> None:
-    """Begin to make the mattes that a preview lacked when it was drawn, and add notes about progress and failure.
+    """Start to make the mattes that a preview lacked when it was drawn, and add notes to it: progress and failures.
 
-    The thread drops mattes that are not wanted any more. To be called on the main thread after drawing a preview.
+    If the thread makes mattes of something that the preview does not lack, it is stopped for what is lacking. If
+    several outlines or subjects lack mattes, one begins; the next drawing of a preview asks for the others.
+
+    Call this on the main thread after drawing a preview.
 
     Args:
         say: Adds a note to the preview.
@@ -131,9 +137,13 @@ def note_tracking(say: Callable[[str], None]) -> None:
 
 
 def _look() -> float | None:
-    """Redraw previews when the thread has made mattes, and notice its end.
+    """Follow the thread that makes mattes, and redraw previews with its mattes.
 
-    A timer of Blender calls this, again after the seconds that it returns; None: not again.
+    That happens when the frames with a drawing are done, and when the thread has ended. If it failed, the reason is
+    noted.
+
+    Returns:
+        The seconds after which Blender, of which this is a timer, calls it again; None ends the timer.
     """
     if (carrying := _mattes.carrying) is None:
         return None

@@ -42,11 +42,14 @@ _MORE = 1.25  # factor for each turn of the wheel
 def curves_now(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> outlines.Curves:
     """Return the curves of an outline or subject at the current frame, in fractions of the picture.
 
-    These are the curves drawn at the frame, or else those around its tracked matte. Where that is not made yet, curves
-    move straight from drawing to drawing.
+    If there is a drawing at this frame, these are its curves. Otherwise they are traced around the tracked matte. If
+    that matte is not made yet, or the outline is not tracked, curves move straight from drawing to drawing.
 
     Args:
-        index: Of the region.
+        scene: The scene of the edit, which has the current frame.
+        effect: The effect.
+        strip: The effect strip.
+        index: The index of the region in the effect.
 
     Raises:
         EffectError, MediaError: The effect has no source, or a matte cannot be read.
@@ -71,13 +74,17 @@ def shown_curves(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) 
 
 
 def carried_frames(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> tuple[CarriedFile, dict[int, int]]:
-    """Return what makes and keeps the mattes of an outline or subject, and which frames of the footage its strip shows.
+    """Return the mattes of a tracked outline or subject, and which frame of the footage each frame of the strip shows.
 
     Args:
-        index: Of the region.
+        scene: The scene of the edit.
+        effect: The effect.
+        strip: The effect strip.
+        index: The index of the region in the effect.
 
     Returns:
-        The CarriedFile, and the frame of the footage, from 0, for each timeline frame of the strip.
+        The CarriedFile that makes and stores the mattes, and {timeline frame: frame of the footage, from 0} for all
+        frames of the strip.
 
     Raises:
         EffectError, MediaError: The outline is not tracked, or the effect has no source.
@@ -88,17 +95,20 @@ def carried_frames(scene: Scene, effect: PropertyGroup, strip: Strip, index: int
 
 
 def next_needed(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> tuple[int | None, float]:
-    """Return the frame of a tracked outline or subject that most needs a drawing: where tracking is least sure.
+    """Find the frame of a tracked outline or a subject that most needs a drawing: where tracking is least sure.
+
+    Only mattes that are made already count. A frame of an outline without one counts as confidence 0; such a frame of a
+    subject is ignored. So are frames of an outline that have a drawing.
 
     Args:
-        index: Of the region.
+        index: Index of the region.
 
     Returns:
-        The timeline frame, the middle one of several, and how sure tracking is there, 0 to 1. If no frame needs a
-        drawing, None and the confidence that all frames reach.
+        The timeline frame with the lowest confidence (if several frames have it, the middle one of them), and this
+        confidence, 0 to 1. If no frame is below the confidence that is enough (SURE, SURE_SUBJECT): None, and that one.
 
     Raises:
-        EffectError, MediaError: The outline is not tracked, or the effect has no source.
+        EffectError, MediaError: The outline is interpolated instead of tracked, or the effect has no source.
     """
     file, shown = carried_frames(scene, effect, strip, index)
     is_subject = effect.regions[index].kind == "SUBJECT"
@@ -116,15 +126,16 @@ def next_needed(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -
 
 
 def find_subject(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> bool:
-    """Make a region a subject, if the network finds one under the strokes nearest in time to the current frame.
+    """Make a region a subject, if the network finds one under its strokes.
 
-    An outline becomes a subject at once, with its drawings.
+    The strokes are those of the region's drawing nearest in time to the current frame. If nothing is found, the region
+    keeps its kind. An outline becomes a subject at once: its drawings are kept, and the network is not asked.
 
     Args:
-        index: Of the region.
+        index: Index of the region.
 
     Returns:
-        Whether a subject was found.
+        Whether the region is a subject now.
 
     Raises:
         EffectError: There are no strokes.
@@ -284,9 +295,10 @@ def subject_outline(self: Operator, _context: Context, effect: PropertyGroup) ->
 
 
 def after_stroke(context: Context, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
-    """Look for a subject under the first stroke of a new effect. If there is one, the region becomes that subject.
+    """Look for a subject under the first stroke of a new effect's first region. If there is one, the region becomes it.
 
-    Called when the pen goes up. Further strokes then mark the subject.
+    Called after each stroke, when the pen goes up. It does nothing for later strokes, or for other regions. Errors are
+    shown to the user in a popup. Once the region is a subject, further strokes on it mark more of the subject.
     """
     region = effect.regions[effect.active_region]
     layer = layer_of(effect, region)

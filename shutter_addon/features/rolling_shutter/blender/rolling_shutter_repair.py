@@ -39,9 +39,9 @@ class Repair(NamedTuple):
     """The rolling shutter repair that an effect contains.
 
     Attributes:
-        region: Index of its ramp.
-        readout: Time from reading the first row to the last, as a fraction of a frame of the footage.
-        side: The side that is read first, an item of choices.SIDES.
+        region: Index of the region that does it: a ramp across the picture.
+        readout: Time from reading the first row (or column) to the last, as a fraction of a frame of the footage.
+        side: The side of the picture that the sensor reads first, an item of choices.SIDES.
     """
 
     region: int
@@ -80,13 +80,15 @@ def _shown(effect: PropertyGroup) -> int:
 def repair(scene: Scene, effect: PropertyGroup, strip: Strip, share: float, side: str) -> None:
     """Add a rolling shutter repair to an effect, or change the one that it has.
 
+    This also sets the effect's window, *Position*, interpolation and, if it is off, *Smooth* as the repair needs them.
+
     Args:
-        share: Readout time as a fraction of a frame of the footage (Repair.readout).
-        side: The side that is read first, an item of choices.SIDES.
+        share: Readout time as a fraction of a frame of the footage, above 0 (Repair.readout).
+        side: The side of the picture that the sensor reads first, an item of choices.SIDES.
 
     Raises:
-        EffectError, MediaError: The effect has no room, the footage cannot be read, or OpenCV is missing. Nothing has
-            changed.
+        EffectError, MediaError: The effect has no room for another region and two shutters, the footage cannot be read,
+            or OpenCV is missing. Nothing has changed.
     """
     frame = scene.frame_current
     if (time := Sampling.of(scene, effect, strip, (frame,)).time) is not None:

@@ -26,20 +26,23 @@ _UNSEEN = 5.0  # seconds without a request after which a picture is dropped
 
 @dataclass
 class _Coming:
-    """A picture with moments between frames (smooth) that is being made for a preview.
+    """A picture with moments between frames (smooth) that is being made while a preview shows a plain one.
 
     Attributes:
-        key: Key of the picture without moments (plain), and effect_source.steps_key.
-        asked: What was last asked for: context, snapshot, timeline frame and detail.
-        steps: Finds on a thread how many moments there are from frame to frame; None: not begun.
-        since: When it was last asked for (time.monotonic).
-        is_asked: Whether it was asked for since advance_smooth was last called.
-        is_seen: Whether the plain picture was drawn.
-        is_over: Whether nothing is left to do.
-        is_alone: Whether the device has no room for both pictures, so that only this one is shown.
-        made: Key of the composed request; None: not composed.
-        fault: Why there is no picture; None: no error.
-        slices: Slices of time in which it is composed.
+        key: Identifies the picture: the key of the request for the plain one (without moments), and
+            effect_source.steps_key.
+        asked: What the preview asked for last: context, snapshot, timeline frame and detail.
+        steps: Future of effect_source.find_steps, which finds on a thread how many moments the effect needs; None: not
+            begun.
+        since: When the preview last asked for the picture (time.monotonic).
+        is_asked: Whether the preview has asked for it since advance_smooth was last called.
+        is_seen: Whether the preview had a chance to show the plain picture first.
+        is_over: Whether nothing is left to do: the picture is ready, or cannot be made.
+        is_alone: Whether the device has no room for the frames of both pictures. Then only the smooth one is drawn from
+            then on.
+        made: Key of the request whose picture is ready; None: none is.
+        fault: The error because of which the picture cannot be made; None: no error.
+        slices: The time slices in which the picture is composed, piece by piece.
     """
 
     key: tuple
@@ -55,10 +58,11 @@ class _Coming:
     slices: Slices = field(default_factory=Slices)
 
     def request(self) -> Request | None:
-        """Return the request for the picture with moments between frames, if that can be made without waiting.
+        """Return the request for the picture with moments between frames, if nothing has to be waited for.
 
         Returns:
-            None if it is not known yet how many moments there are, or if its renderer is not open.
+            None: It is not known yet how many moments there are, or no renderer is open yet for the footage with
+            moments.
         """
         render, snapshot, frame, detail = self.asked
         if known_steps(snapshot) is None or render.session.open_renderer(SourceKey.of(snapshot, detail)) is None:
@@ -79,10 +83,15 @@ class _Coming:
             self.asked[0].renderer(request).source.want(())
 
     def advance(self, seconds: float) -> float:
-        """Go on making the picture: find how many moments there are, or compose the picture for some seconds.
+        """Do the next piece of work on the picture: find how many moments there are, or compose it for a slice of time.
+
+        The first call does nothing, so that the preview can show the plain picture first.
+
+        Args:
+            seconds: How long composing may take. A slice may be longer than the last one, so that all work ends.
 
         Returns:
-            In how many seconds to redraw the preview and go on.
+            In how many seconds to redraw the preview, which then goes on; 0: at once.
         """
         render, snapshot, frame, detail = self.asked
         if not self.is_seen:
@@ -112,12 +121,13 @@ _coming: dict[int, _Coming] = {}  # by effect scene
 
 
 def smooth_request(render: RenderContext, snapshot: Snapshot, frame: float, detail: Detail) -> tuple[Request, bool]:
-    """Return the request for the picture with moments between frames if that is ready, else for the one without.
+    """Return the request for the picture that a preview can show now: with moments between frames, or the plain one.
 
-    If the effect has moments and they are not ready, begin to make that picture.
+    If the effect has moments and that picture is not ready, the plain one is shown first, and advance_smooth makes the
+    other.
 
     Returns:
-        The request, and whether the picture with moments will follow later.
+        The request, and whether the picture with moments is still to come, so that the preview has to be drawn again.
 
     Raises:
         effect_source.FAULTS: The effect cannot be shown.
@@ -144,10 +154,16 @@ def smooth_request(render: RenderContext, snapshot: Snapshot, frame: float, deta
 
 
 def advance_smooth(seconds: float) -> None:
-    """Go on making pictures with moments between frames, for some seconds each, if previews still ask for them.
+    """Go on making the pictures with moments between frames that previews have asked for since the last call.
+
+    This works on each picture for some seconds and has previews drawn again, which ask for it again. A picture that no
+    preview has asked for during _UNSEEN seconds is dropped.
+
+    Args:
+        seconds: How long to compose each picture, roughly.
 
     Raises:
-        effect_source.FAULTS: One cannot be made.
+        effect_source.FAULTS: A picture cannot be made.
     """
     for scene, coming in list(_coming.items()):
         if time.monotonic() > coming.since + _UNSEEN:

@@ -46,11 +46,12 @@ class _Measuring:
     """What is measured, and what is known.
 
     Attributes:
-        moved: Motion by the source's key and the first frame of a pair of neighbors; None: it cannot be found.
-        looks: By session_uid of the effect scene, what the last call of `look` found: the timeline frame, the step in
-            pixels, and whether the source repeats frames.
-        wanted: What to measure next: a source, and the first frame of a pair; None: nothing.
-        job: The measurement that is running; None: none.
+        moved: How the picture moves between neighboring frames. Keys are the source's key and the first of the two
+            frames. The value None means that motion cannot be found or is being measured.
+        looks: What the last call of `look` found, by session_uid of the effect scene: the timeline frame, the step in
+            pixels (None: none to report), and whether the source repeats frames.
+        wanted: What to measure next: the source, and the first of two neighboring frames; None: nothing.
+        job: The measurement that is running on a thread; None: none is.
     """
 
     moved: RecentValues[tuple, smooth.Moved | None] = field(default_factory=RecentValues)
@@ -63,12 +64,15 @@ _measuring = _Measuring()
 
 
 def look(effect: PropertyGroup, snapshot: Snapshot, renderer: Renderer, request: Request) -> tuple[float | None, bool]:
-    """Tell from past measurements how far the picture moves between exposed frames. What is unknown is measured later.
+    """Tell how far the picture moves between exposed frames, if that is too far for a streak.
+
+    This never waits: if the motion is not known yet, it is noted as the next one to measure (`advance` does so).
 
     Returns:
-        The step from one frame to the next in pixels of the footage. None: it is small enough for a streak, not known
-        yet, or Smooth is on.
-        Whether the step, or whether the source repeats frames, differs from what the last call for this effect found.
+        The step from one exposed frame to the next, in pixels of the picture. None: it is small enough for a streak, or
+        not known yet, or *Smooth* is on.
+        Whether something is new: the step, or whether the source repeats frames, differs from what the last call for
+        this effect found. A step found at another timeline frame counts as None.
     """
     _measuring.wanted, before = None, (last(effect), repeats(effect))
     frame, known = effect.id_data.frame_current, _step(effect, snapshot, renderer, request)
@@ -106,9 +110,12 @@ def _step(effect: PropertyGroup, snapshot: Snapshot, renderer: Renderer, request
 
 
 def _exposed_pairs(renderer: Renderer, request: Request) -> dict[int, set[int]]:
-    """Return for each visible shutter, by index, the pairs of neighboring frames that it exposes without closing.
+    """Return for each visible shutter the pairs of neighboring source frames that it exposes without a gap.
 
-    A pair is given by its first frame. Shutters that take the median leave no streaks and are left out.
+    Only such pairs can make a streak. Shutters that take the median leave no streaks and are left out.
+
+    Returns:
+        By the shutter's index, the first frame of each pair, the earlier one in the footage.
     """
     state, pairs = request.state, {}
     shot = renderer.shot(request, known=True)
@@ -131,12 +138,17 @@ def _visible(state: FrameState) -> set[int]:
 
 
 def _ways(state: FrameState, shutter: int, pair: int, height: int) -> tuple[Similarity, Similarity]:
-    """Return the motions from the shown picture to the two frames of a pair, of what a shutter's exposure follows.
+    """Return how what a shutter's exposure follows moves from the shown picture to each of two neighboring frames.
 
     Args:
+        state: The effect at the shown frame.
         shutter: Index of the shutter.
-        pair: The first frame.
-        height: Of the pictures in which motions count pixels. The result counts heights of the picture.
+        pair: The first of the two source frames.
+        height: Height in pixels of the pictures to whose pixels the effect's motions refer.
+
+    Returns:
+        The motion to the first frame and that to the second, with shifts in heights of the picture. If nothing is
+        followed, both leave all points in place.
     """
     if state.following is None:
         return Similarity(), Similarity()
@@ -165,8 +177,10 @@ def note_streaks(
 ) -> None:
     """Add a note to a preview if the exposure has too few frames. Unknown motion is measured once the playhead rests.
 
+    Called while a preview is drawn. When a measurement has finished, previews and panels are drawn again.
+
     Args:
-        say: Adds a note.
+        say: A function that adds a note to the preview.
     """
     known, is_new = look(effect, snapshot, renderer, request)
     if known is not None:

@@ -27,15 +27,16 @@ Point = tuple[str, np.ndarray, np.ndarray]  # see _markers
 
 
 def follow(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> None:
-    """Insert keyframes that move a region with its track, from its place at the current frame and the user's keyframes.
+    """Make a region follow a movie clip's track: insert keyframes of its motion wherever the track is known.
 
-    Notes of where tracking of the region had stopped are removed.
+    The region's place at the current frame and at keyframes that the user made stays; between these, motion from both
+    is blended. Notes of where an earlier tracking of the region stopped are removed.
 
     Args:
-        index: Of the region.
+        index: Index of the region.
 
     Raises:
-        EffectError, MediaError: It cannot follow the track. Nothing has changed.
+        EffectError, MediaError: The region cannot follow the track. Nothing has changed.
     """
     start, region = scene.frame_current, effect.regions[index]
     points = _points(scene, effect, strip, index, start)
@@ -58,13 +59,16 @@ def holder_of(region: PropertyGroup) -> MovieTrackingObject | None:
 
 
 def _markers(region: PropertyGroup) -> list[Point]:
-    """Return each point of a movie clip that a region follows: its name, and the places of its markers.
+    """Return the points of a movie clip that a region follows.
+
+    These are one track, all tracks of an object, or the four corners of a plane track.
 
     Returns:
-        Name, the clip's frames (n,), ascending, and places (n, 2) in fractions of the picture.
+        For each point: its name; the clip's frames where it has a marker that is not muted, (n,), ascending; and the
+        marker's places there, (n, 2), in fractions of the picture.
 
     Raises:
-        EffectError: No clip is chosen, or it has no such track.
+        EffectError: No clip is chosen, or it has no such track or object.
     """
     clip = region.follow_clip
     if clip is None:
@@ -100,14 +104,18 @@ def _shown(name: str, markers: bpy.types.bpy_prop_collection, places: np.ndarray
 
 
 def _points(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, start: int) -> dict[int, Points]:
-    """Return the points that a region follows, in pixels, at each timeline frame of the strip.
+    """Return where the points that a region follows are, at each timeline frame of the strip.
 
     Args:
-        index: Of the region.
+        index: Index of the region.
         start: Timeline frame from which the region will move.
 
+    Returns:
+        By timeline frame, then by the point's name: its place in pixels, x + iy. Frames without any point are left out.
+
     Raises:
-        EffectError, MediaError: There are none at `start`, or the region cannot be keyed or has no strokes.
+        EffectError, MediaError: There are no points at `start`, the region's motion cannot be keyed, the region has no
+            strokes, or the strip does not show the clip's footage.
     """
     region = effect.regions[index]
     validation.check_moving(region)
@@ -131,10 +139,14 @@ def _points(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, start
 
 
 def _clip_times(scene: Scene, effect: PropertyGroup, strip: Strip, clip: MovieClip) -> dict[int, float]:
-    """Return the clip's frame at each timeline frame of the strip. It may lie between two frames.
+    """Return which frame of the movie clip each timeline frame of the strip shows.
+
+    Returns:
+        By timeline frame, the frame of the clip, which counts as Blender does, from 1. It is not a whole number if the
+        strip shows a moment between two frames.
 
     Raises:
-        EffectError, MediaError: The strip does not show the clip's footage.
+        EffectError, MediaError: The strip does not show the clip's footage, or that cannot be read.
     """
     frames = range(strip.left_handle, strip.right_handle)
     source = strips.source_of(scene, effect, strip)
@@ -162,12 +174,15 @@ def _check_footage(source: Strip, clip: MovieClip) -> None:
 
 
 def _place_at(frames: np.ndarray, places: np.ndarray, time: float) -> np.ndarray | None:
-    """Return the place of a marker at a clip's frame, interpolated between two; None: it has no marker there.
+    """Return a point's place at some time of a clip, interpolated between the markers at the frames before and after.
 
     Args:
-        frames: Frames of its markers (n,).
-        places: Their places (n, 2).
-        time: Frame of the clip, maybe between two.
+        frames: The clip's frames where the point has markers, (n,).
+        places: The markers' places, (n, 2).
+        time: Frame of the clip, not always a whole number.
+
+    Returns:
+        The place, (2,). None: the point has no marker at one of the two frames.
     """
     ends = [np.flatnonzero(frames == end) for end in (np.floor(time), np.ceil(time))]
     if not all(map(len, ends)):
@@ -179,25 +194,32 @@ def _place_at(frames: np.ndarray, places: np.ndarray, time: float) -> np.ndarray
 def _followed(
     subject: Region, frames: list[int], moves: dict[int, Motions], start: int, size: tuple[int, int]
 ) -> dict[int, Placement]:
-    """Return where a region is at each frame, moved along from the frames where its place is known.
+    """Return the placement of a region at each frame, moved along with the picture from the frames where it is known.
 
-    Between two of these, motion from both is blended.
+    Between two frames with a known placement, motion from both is blended.
 
     Args:
+        subject: The region as plain data.
         frames: Timeline frames, ascending.
-        moves: For each frame with a known place, `start` included, the picture's motion from there to other frames.
-        start: Timeline frame from which the region is followed both ways.
+        moves: For each frame with a known placement, `start` included, the picture's motion from there to other frames.
+        start: Timeline frame from which the region is followed in both directions of time.
         size: Width and height of the picture in pixels.
+
+    Returns:
+        By timeline frame, ascending, the placement. Frames to which no motion is known are left out.
     """
     known, placed = sorted(moves), ((frame, subject.centre(frame)) for frame in frames)
     centres = {frame: centre for frame, centre in placed if centre is not None}
     result = {start: subject.placement(start)}
 
     def carried(origin: int, frame: int, near: Placement) -> Placement | None:
-        """Return where the region is at a frame, moved along from the frame `origin`; None: there are too few points.
+        """Return the region's placement at a frame, moved along from the frame `origin`; None: motion is not known.
 
         Args:
-            near: Its place at a neighboring frame, from which rotation goes on without a jump by whole turns.
+            origin: A timeline frame where the placement is known.
+            frame: The timeline frame.
+            near: The placement at a neighboring frame. The result's rotation continues it without a jump by whole
+                turns.
         """
         if (motion := moves[origin].get(frame)) is None:
             return None
@@ -224,9 +246,17 @@ def _ways(frames: list[int], start: int) -> tuple[list[int], list[int]]:
 
 
 def _motions(points: dict[int, Points], origin: int) -> Motions:
-    """Return the picture's motion from the frame `origin` to each frame, by the points that both have.
+    """Return the picture's motion from one frame to each other frame, by the points that both have.
 
-    With too few common points, motion is joined through the frame before.
+    If they have too few points in common (fewer than two, or one if `origin` has only one), the motion goes by way of
+    the last frame before it, seen from `origin`, whose motion is known.
+
+    Args:
+        points: The points in pixels, by timeline frame and name.
+        origin: The timeline frame at which motion begins.
+
+    Returns:
+        The motion by timeline frame. Frames to which none is found are left out.
     """
     by_frame = {origin: Similarity()}
     enough = min(2, len(points[origin]))

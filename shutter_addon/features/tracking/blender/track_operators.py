@@ -42,11 +42,13 @@ _DIRECTION = given(
 class _Tracks(Beside):
     """A base of operators that track the active region or the camera from the current frame, step by step.
 
-    Subclasses have `direction`, an item of DIRECTIONS.
+    Subclasses also have the attribute `direction`, an item of DIRECTIONS: whether to track backward, forward or both
+    ways.
 
     Attributes:
-        is_camera: Whether the camera is tracked.
-        once: Whether what is tracked already is not tracked again.
+        is_camera: Whether the camera is tracked instead of the active region.
+        once: Whether tracking is skipped if the region or the camera is tracked already. `ended` is called all the
+            same.
     """
 
     bl_options = {"UNDO"}
@@ -108,10 +110,14 @@ class _Tracks(Beside):
         super().leave(context)
 
     def _track(self, seconds: float) -> bool:
-        """Track for some seconds. Return whether frames are left to track.
+        """Track for some seconds, and return whether frames are left to track.
+
+        Args:
+            seconds: How long; math.inf: to the end.
 
         Raises:
-            FAULTS: Nothing can be tracked. Once a frame is tracked, errors are reported to the user instead.
+            FAULTS: Tracking fails before any frame is tracked. Later errors are reported to the user, and tracking
+                ends.
         """
         end = time.perf_counter() + seconds
         try:
@@ -207,14 +213,17 @@ _FRAME = given(IntProperty, "Frame", "Timeline frame; without one, the least con
 
 
 def _look(looking: Operator, effect: PropertyGroup, index: int | None) -> set[str] | None:
-    """Go to the given frame, or to the next one where tracking is unsure.
+    """Go to the timeline frame that the operator's property `frame` gives or, if that is not set, to an unsure frame.
+
+    That is the least sure frame of the next stretch of frames where tracking is unsure; for a subject, the frame of the
+    whole strip that most needs a drawing.
 
     Args:
         looking: The operator, with the property `frame`.
-        index: Of the region; None: the camera.
+        index: Index of the region; None: the camera.
 
     Returns:
-        {"CANCELLED"} if no unsure frame is left, else None.
+        {"CANCELLED"} if no unsure frame is left, which the user is told; else None.
     """
     frame: int | None = looking.frame
     is_given = looking.properties.is_property_set("frame")
@@ -256,11 +265,11 @@ _SETTINGS = "motion", "track_until", "track_all_keys", "track_ends"  # of tracki
 
 
 def draw_tracking(layout: UILayout, index: int | None, is_subject: bool = False) -> None:
-    """Draw the buttons that track a region or the camera, and go to unsure frames.
+    """Draw a row of buttons: those that track a region or the camera, and one that goes to the next unsure frame.
 
     Args:
-        index: Of the region; None: the camera.
-        is_subject: Whether the region is a subject, which has another operator for unsure frames.
+        index: Index of the region; None: the camera.
+        is_subject: Whether the region is a subject. The last button then finds the frame that most needs a drawing.
     """
     row = layout.row(align=True)
     track = "shutter.track_camera" if index is None else "shutter.track"
@@ -282,10 +291,10 @@ def tracking_icon(effect: PropertyGroup, index: int | None) -> str | None:
 
 
 def draw_tracked(layout: UILayout, effect: PropertyGroup, index: int | None) -> None:
-    """Draw how sure tracking is at the current frame, and where it stopped or lost the subject.
+    """Draw how sure tracking is at the current frame, and buttons for where it stopped or lost the subject.
 
     Args:
-        index: Of the region; None: the camera.
+        index: Index of the region; None: the camera.
     """
     look = "shutter.track_camera_look" if index is None else "shutter.track_look"
     confidence = track_region.confidence_at(effect, index, effect.id_data.frame_current)
