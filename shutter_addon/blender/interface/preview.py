@@ -133,7 +133,7 @@ def _show(context: Context, shown: Shown, decision: Decision | None, say: Say) -
 
     Args:
         shown: The effect strip that the preview shows.
-        decision: What the engine was asked for just before, and who draws it; None: the engine was not asked.
+        decision: What previews.for_engine decided in this redraw; None: Blender has not asked the engine for a picture.
         say: Adds a note.
     """
     try:
@@ -244,9 +244,10 @@ def _show_strokes(context: Context, quad: Quad, shown: Shown, snapshot: Snapshot
 
 
 def _show_source(quad: Quad, shown: Shown, renderer: Renderer, request: Request, right: float) -> None:
-    """Draw the source frame from the picture's left edge to `right`, a fraction of its width.
+    """Draw the frame of the footage shown now, without the effect, for views that show the source.
 
-    It is composed by a shutter that is open for this frame alone.
+    Args:
+        right: Where the drawing ends, as a fraction of the picture's width from its left edge; 1: it covers all.
     """
     options = replace(request.state.options, step=1)  # reversed moments would come first
     still = np.zeros((1, options.window))
@@ -261,14 +262,17 @@ def _show_source(quad: Quad, shown: Shown, renderer: Renderer, request: Request,
 def _show_shares(
     quad: Quad, step: str, colors: Colors, drawn: tuple[Texture, int], renderer: Renderer, opacity: float, **more
 ) -> None:
-    """Draw in the shutters' colors which shutter's strokes cover each pixel, or the share of each shutter in the pixel.
+    """Draw one of the views *Scribbles*, *Mattes* or *Edges* in the shutters' colors.
 
     Args:
-        step: Pass of shaders/show.glsl that draws this; also the name of the view.
-        colors: Of the shutters, display values 0 to 1.
-        drawn: The texture of labels or shares, and the side in pixels of the blocks that share a texel.
+        step: The view, and the pass of shaders/show.glsl that draws it: "SCRIBBLES" (which shutter's strokes cover a
+            pixel), "COEFFICIENTS" (the pixel's share of each shutter) or "EDGES" (lines around areas where a shutter
+            has more than half).
+        colors: The color of each shutter.
+        drawn: The texture with the strokes' shutters or the shares, and the side in pixels of the blocks that share a
+            texel.
         opacity: 0 to 1.
-        more: Further constants of the pass.
+        more: Further uniforms of the pass.
     """
     (texture, block), source = drawn, renderer.source
     rgba, size = np.ones((len(colors), 4), dtype=np.float32), (len(colors), 1)

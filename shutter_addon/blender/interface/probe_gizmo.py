@@ -23,17 +23,17 @@ _MARK = (1.0, 1.0, 1.0, 0.9)
 
 
 def probed_at(renderer: Renderer, request: Request, point: Sequence[float]) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return how a pixel is exposed: how much of each shutter it gets, and how much each frame counts for it.
+    """Return how a pixel is exposed: its share of each shutter, and the weight of each frame that results.
 
-    Call this only while Blender draws, because one texel is read from its GPU. The shares of shutters are
-    computed again only if something changed since they were drawn.
+    Call this only while Blender draws, because one texel is read from its GPU. The shares are computed again only if
+    something changed since they were drawn. Layers are ignored.
 
     Args:
-        point: In fractions of the picture, y up.
+        point: (x, y) in fractions of the picture, y up.
 
     Returns:
-        The share of each shutter (N,), which sum to 1, and the weight of each frame (L,); None: the point is
-        outside the picture.
+        The share of each of N shutters (N,), with the sum 1, and the weight of each of the L frames of the window (L,).
+        None: the point is outside the picture.
     """
     source = renderer.source
     column, row = int(np.floor(point[0] * source.width)), int(np.floor((1 - point[1]) * source.height))
@@ -47,18 +47,18 @@ def probed_at(renderer: Renderer, request: Request, point: Sequence[float]) -> t
 
 
 def layout(point: Sequence[float], size: tuple[int, int], count: int, unit: float) -> tuple[Box, Box, list[float]]:
-    """Return where the probe and its parts are drawn, in pixels of the region.
+    """Return where the probe and its parts are drawn, in pixels of the preview's region, y up.
 
     The box lies at the lower right of the point, or on the other side if there is no room.
 
     Args:
-        point: The point that is probed.
+        point: The point that is probed, in the same pixels.
         size: Width and height of the region.
         count: Number of lines of text.
         unit: Pixels per interface unit.
 
     Returns:
-        The box around everything, the box of the bars, and the bottom of each line of text.
+        The box around everything, the box of the bars, and the y of the bottom of each line of text.
     """
     width, height = (_WIDTH + 2 * _PAD) * unit, (_HEIGHT + count * _LINE + 3 * _PAD) * unit
     x, y = point
@@ -96,9 +96,9 @@ class SHUTTER_GT_probe(Gizmo):
             _draw(context.region, point, shown.effect.shutters, *probed)
 
     def test_select(self, context: Context, location: tuple[int, int]) -> int:
-        """Note the pointer's position. Blender calls this whenever the pointer moves.
+        """Store the pointer's position as the probe's, and return -1: the pointer is not over this gizmo.
 
-        No other callback of a gizmo would leave the events to others.
+        Blender calls this whenever the pointer moves. Callbacks that handle events would take clicks from other tools.
         """
         if (seen := _view(context)) is not None:
             x, y = location
@@ -107,12 +107,14 @@ class SHUTTER_GT_probe(Gizmo):
 
 
 def _draw(region: Region, point: Sequence, shutters: Sequence, shares: np.ndarray, mixed: np.ndarray) -> None:
-    """Draw the probe: a box with the pixel's bars, and a line of text for each of its shutters.
+    """Draw the probe: a box with the pixel's mixed shutter as bars, and a line with the share of each shutter.
 
     Args:
-        point: Probed point in pixels of the region.
-        shares: How much of each shutter the pixel gets (N,).
-        mixed: How much each frame counts for the pixel (L,).
+        region: The preview's region.
+        point: The probed point, in pixels of the region.
+        shutters: The effect's N shutters.
+        shares: The pixel's share of each shutter (N,), with the sum 1.
+        mixed: The weight of each frame of the window for the pixel (L,), one bar each.
     """
     unit = drawing.ui_scale()
     frame, bars, lines = layout(point, (region.width, region.height), len(shutters), unit)

@@ -24,10 +24,10 @@ _RAMP = np.array([(0.25, 0.5), (0.75, 0.5)])  # line of a ramp, in fractions of 
 
 
 class Place(NamedTuple):
-    """Where a region's handles are at the current frame, in pixels of the preview's region.
+    """Where the handles of an effect's region are at the current frame, in pixels of the preview.
 
     Attributes:
-        centre: Point (2,) of the handle that moves the region.
+        centre: Point (2,) of the handle that moves the effect's region.
         corner: Point (2,) of the handle that rotates and scales it.
         view: Where the preview shows the picture.
     """
@@ -38,9 +38,13 @@ class Place(NamedTuple):
 
 
 def _strokes_now(scene: Scene, effect: PropertyGroup, strip: Strip) -> list[np.ndarray]:
-    """Return the active region's strokes (n, 2), or the line of a ramp, in fractions of the picture.
+    """Return the active region's strokes, each (n, 2) in fractions of the picture, without the region's motion.
 
-    They are where they would be without the region's motion, and are cached until something changes.
+    The result is cached until something changes. A ramp by place has a constant line; a matte or a luminance ramp has
+    no strokes ([]).
+
+    Raises:
+        EffectError: A stroke is too far outside the picture.
     """
     index, frame = effect.active_region, scene.frame_float
     region = effect.regions[index]

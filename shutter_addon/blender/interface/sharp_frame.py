@@ -17,10 +17,13 @@ _TOOLS = "builtin.annotate"  # prefix of the tools' names
 
 
 def take_up(context: Context, tool: str) -> bool:
-    """Activate an annotation tool in all previews until a stroke is finished. Return whether a preview is open.
+    """Activate an annotation tool in all previews, until a stroke is finished: then the tool active before returns.
 
     Args:
         tool: Blender's identifier of the tool.
+
+    Returns:
+        Whether any preview is open.
     """
     before = context.workspace.tools.from_space_sequencer("PREVIEW", create=False)
     if before is None or not before.idname.startswith(_TOOLS):
@@ -38,9 +41,10 @@ def _choose(context: Context, tool: str) -> bool:
 
 
 def show(context: Context) -> None:
-    """Show the active effect's source frame, to draw on, in the previews that have the effect's annotation.
+    """Show the active effect's source strip in previews, so that the user can draw on a sharp frame.
 
-    Do nothing if the source is muted, or does not lie in the same meta strip as the effect.
+    This sets *Display Channel* to the channel of the source strip in previews that show all channels and have the
+    effect's annotation. Do nothing if the source is missing, muted, or not in the same meta strip as the effect.
     """
     active = selection.active(context)
     source = active and strips.nearest_source(*active)
@@ -69,9 +73,10 @@ def forget() -> None:
 
 
 def follow_pen() -> None:
-    """Notice, while a preview is drawn, whether the pen went down or up, and show the source frame or the result.
+    """Show the source strip once the pen is down, and the result once it is up again. Called when a preview is drawn.
 
-    The change is made later, by a timer, because drawing code must not change data.
+    Drawing code must not change data, so a timer makes the change. After the stroke, the timer also restores the tool
+    that *Draw* or *Erase* replaced.
     """
     was_down, looking.pen.is_down = looking.pen.is_down, pen_is_down()
     if looking.pen.is_down and not looking.pen.channel:
@@ -86,9 +91,10 @@ def is_shown(space: SpaceSequenceEditor) -> bool:
 
 
 def _tool_chosen() -> None:
-    """Show the result instead of the source frame, if the user has activated a tool that does not draw.
+    """Show the result instead of the source strip, if the user has activated a tool that does not draw.
 
-    Blender calls this when the active tool changes, because it redraws no preview then.
+    Then no tool is restored after a stroke. Blender calls this when the active tool changes, since it redraws no
+    preview then.
     """
     tool = bpy.context.workspace.tools.from_space_sequencer("PREVIEW", create=False)
     if tool is not None and not tool.idname.startswith(_TOOLS):

@@ -86,9 +86,9 @@ def _notes(session: RenderSession, folders: set[Path], taken: snapshot.Snapshot)
 
 
 def _check_footage(scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
-    """Check that an effect's footage is there, has the size as when the edit was saved, and is not shorter.
+    """Check that an effect's footage exists, and has the size and at least the length that the saved edit expects.
 
-    The effect scene stores the size. The length is not checked if the source strip is retimed.
+    The size is that of the effect scene. The length is that of the source strip, and not checked if it is retimed.
 
     Raises:
         UserError: The footage is missing, or has changed.
@@ -108,11 +108,12 @@ def _check_footage(scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
 
 
 def _check_readable(source: FrameSource, indices: set[int], step: int = 1) -> None:
-    """Check that the files of some frames exist, and that the first and the last of the frames can be decoded.
+    """Check that the files of some frames exist (for image sequences), and that the first and the last can be decoded.
 
     Args:
-        indices: Frames of the footage, from 0.
-        step: How many of the source's frames (interpolated moments) lead from a frame of the footage to the next.
+        source: What frames are read from.
+        indices: Numbers of filmed frames, from 0.
+        step: `source` numbers frames computed between filmed ones, too: filmed frame i is its frame i · step.
 
     Raises:
         MediaError: A file is missing, or a frame cannot be decoded.
@@ -125,10 +126,15 @@ def _check_readable(source: FrameSource, indices: set[int], step: int = 1) -> No
 
 
 def _lacking_mattes(source: FrameSource, requests: list[Request], folders: set[Path]) -> int:
-    """Check that the mattes of requested pictures can be read, and return how many of them have yet to be tracked.
+    """Check that matte files can be read at the frames of some pictures, and count outlines that are not tracked yet.
 
     Args:
-        folders: A set to which the folders are added where the tracked mattes will be stored.
+        source: The effect's footage.
+        requests: The pictures.
+        folders: A set to which the folders are added where missing tracked mattes will be stored.
+
+    Returns:
+        The number of frames of outlines' mattes that the render will have to track.
 
     Raises:
         MediaError: A matte cannot be read.

@@ -32,15 +32,16 @@ _ROWS, _COLUMNS = 64, 16
 
 @dataclass
 class _Film:
-    """How a render has changed the edit.
+    """What was done so far to give one render its pictures through a file (see this module).
 
     Attributes:
         scene: session_uid of the edit's scene.
-        changed: Undoes the changes when it is closed.
+        changed: Restores the edit and removes the file when it is closed.
         strip: Name of the temporary strip that shows the file; None: not added yet.
-        file: The file of levels; None: not made yet.
-        makes_levels: What sole_effect.has_known_levels returned; None: not asked yet.
-        has_begun: Whether a frame was rendered.
+        file: The file with the current picture; None: not made yet.
+        makes_levels: Whether the scene's output has predictable 8-bit levels (sole_effect.has_known_levels); None: not
+            asked yet.
+        has_begun: Whether before_frame was called for the first frame, which the engine renders.
     """
 
     scene: int
@@ -66,9 +67,10 @@ def end() -> None:
 
 
 def before_frame(scene: Scene) -> None:
-    """Write the next frame's levels to the file and show the file's strip, if that is possible.
+    """Prepare a film's next frame: if only an effect strip is visible, make its picture and show it through the file.
 
-    Otherwise mute the strip, so that Blender asks the engine. Called before each frame; leaves the first to the engine.
+    Otherwise hide the temporary strip, so that Blender asks the engine. Call this before each frame. The first frame
+    always goes to the engine, since it may be a single picture that is saved as floats.
     """
     film = render_job.job.film_data.feed
     if film is None or film.scene != scene.session_uid:
@@ -86,14 +88,15 @@ def before_frame(scene: Scene) -> None:
 
 
 def _feed(film: _Film, scene: Scene, strip: Strip, is_blended: bool) -> bool:
-    """Make the effect's picture at the scene's current frame, and write its levels to the file.
+    """Make an effect's picture at the scene's current frame, and write it to the file as 8-bit values.
 
     Args:
         strip: The effect strip that alone is visible.
-        is_blended: Whether Blender would blend that strip with one below.
+        is_blended: Whether Blender would blend that strip with one below, which changes the last bits of colors.
 
     Returns:
-        False if the engine has to render the frame, and report what is wrong.
+        False: the engine has to render this frame, because the picture is not opaque, has another size than the film,
+        or failed. After a failure, the file is no longer used, and the engine reports the fault.
     """
     try:
         shown = scene.frame_current - strips.origin(strip) + strip.scene.frame_start
@@ -118,7 +121,7 @@ def _feed(film: _Film, scene: Scene, strip: Strip, is_blended: bool) -> bool:
 
 
 def _file(film: _Film, scene: Scene) -> "LevelsFile":
-    """Return the file of 8-bit levels. The first time, make the file, and add a strip that shows it.
+    """Return the file for pictures' 8-bit values. The first time, make the file, and add a strip that shows it.
 
     Raises:
         OSError: The file cannot be written.
@@ -158,7 +161,7 @@ def _add_strip(film: _Film, scene: Scene, path: Path) -> str:
 
 
 class LevelsFile:
-    """An uncompressed TIFF of 8-bit RGBA pixels, which are overwritten in place for each frame."""
+    """An uncompressed TIFF of 8-bit RGBA pixels. Each frame's picture is written over the last, for Blender to read."""
 
     def __init__(self, path: Path, width: int, height: int) -> None:
         """Create the file with room for all later pictures.
@@ -181,10 +184,13 @@ class LevelsFile:
         self._file = path.open("r+b", buffering=0)
 
     def write(self, levels: np.ndarray) -> None:
-        """Overwrite the pixels with levels, uint8 (H, W, 4), top row first.
+        """Replace the picture in the file.
+
+        Args:
+            levels: The picture, uint8 (H, W, 4), top row first.
 
         Raises:
-            OSError: The file is gone. Blender would show it as a single color.
+            OSError: The file cannot be written or was deleted. Blender would show a deleted file as a single color.
         """
         if self._padding:
             levels = np.pad(levels, ((0, 0), (0, self._padding), (0, 0)))

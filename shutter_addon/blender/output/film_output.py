@@ -104,7 +104,7 @@ def check_movie(output: Path, read: list[Path]) -> None:
         read: Files that must not be overwritten.
 
     Raises:
-        OutputError: It has no movie's suffix, Blender cannot use it, or it is one of `read`.
+        OutputError: It has no movie's suffix, contains a backslash that is no separator, or is one of `read`.
     """
     if not is_movie(output):
         raise OutputError(f"{output}: none of {', '.join(MOVIES)}")
@@ -167,7 +167,7 @@ def blender_path(path: str) -> str:
     """Return a path with its braces doubled, since Blender takes single ones for template fields.
 
     Raises:
-        OutputError: Blender cannot write to the path.
+        OutputError: The path contains a backslash that is no separator: Blender cannot write there.
     """
     if os.sep == "/" and "\\" in path:
         raise OutputError(f"{path}: Blender cannot write to a path with \\")
@@ -213,6 +213,8 @@ def set_place(render: RenderSettings, path: Path) -> None:
 
 def set_pictures(scene: Scene, file_format: str, note: str) -> None:
     """Set a scene's output to pictures of every frame, with the edit's color settings and a note in their metadata.
+
+    Pictures have no note if the edit burns metadata into them.
 
     Args:
         file_format: A key of FORMATS.
@@ -339,12 +341,15 @@ def message(error: RuntimeError) -> str:
 def _moved(part: Path, output: Path, scene: Scene, update: Callable[[], None], move: Move) -> Iterator[dict[str, Path]]:
     """Move finished pictures from the folder `part` to `output` after each frame, within a `with` block.
 
+    If `update` or `move` raises UserError or OSError, or a picture is damaged, the render ends.
+
     Args:
         update: Called after each frame.
-        move: Called with a finished picture and its final path. `update` and `move` may raise to end the render.
+        move: Called with a finished picture and its final path.
 
     Yields:
-        The pictures that are still missing, by name; empty for a movie.
+        The final paths of pictures that are not moved yet, by file name. It shrinks during the render; empty for a
+        movie.
     """
     frames = range(scene.frame_start, scene.frame_end + 1)
     settings = scene.render.image_settings

@@ -70,11 +70,15 @@ def _ramp(region: PropertyGroup) -> RampContent:
 
 
 def _folder(region: PropertyGroup, path: Path, number: int) -> Path | None:
-    """Return the folder for the pictures of a region's matte; None: the recipe needs none, as for ramps and files.
+    """Return the folder into which the pictures of a region's matte are to be written.
 
     Args:
         path: Path of the recipe.
-        number: Number of the region, for the folder's name.
+        number: Number of the region in the effect's list of mattes, from 1, for the folder's name.
+
+    Returns:
+        The folder; None for ramps and mattes from a file, since the recipe names these. A single picture that a recipe
+        would take for the first of an image sequence gets a folder, too.
     """
     if region.kind == "RAMP" or (region.matte == "IMAGE" and not _is_one_of_many(region)):
         return None
@@ -132,11 +136,16 @@ def _write(shown: EffectStrip, region: PropertyGroup, folder: Path, first: int, 
     """Write a matte as a picture for each timeline frame of the effect strip, all or none.
 
     Args:
+        shown: Scene, effect and effect strip.
+        region: The region that has the matte.
         first: Number in the first picture's name; the others count on from it.
         suffix: "png" or "exr".
 
     Returns:
         The number of pictures.
+
+    Raises:
+        effect_source.FAULTS, OSError: As in `save`.
     """
     folder.mkdir(parents=True, exist_ok=True)
     frames = range(shown[2].left_handle, shown[2].right_handle)

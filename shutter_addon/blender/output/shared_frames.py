@@ -103,14 +103,17 @@ def _resume(scene: Scene, folder: Path, missing: dict[int, Path], key: str, writ
 
 
 def _claim_run(claims: Claims, missing: dict[int, Path], key: str, moved: Callable) -> list[int]:
-    """Claim up to RUN successive missing frames, so that no other process renders them, and return these frames.
+    """Claim up to RUN successive missing frames, so that no other process renders them.
 
-    The list is empty if others have claimed all. Frames that turn out to be finished are removed from `missing`.
+    Frames that have been finished meanwhile are removed from `missing`.
 
     Args:
-        missing: Paths of the missing pictures, by frame.
+        missing: Path of each picture not known to be finished, by frame. Changed in place.
         key: Key of the edit's version, which finished pictures carry.
-        moved: Called for each finished frame.
+        moved: Called for each frame that is removed from `missing`.
+
+    Returns:
+        The claimed frames; empty if all missing frames are claimed by others or are finished.
     """
     run: list[int] = []
     for frame, picture in list(missing.items()):

@@ -48,7 +48,7 @@ class Detail:
     Attributes:
         divisor: How many times smaller than the source the picture is in width and height (media.open_source).
         proxy: The proxy that frames are read from, if it fits the footage; None: the footage.
-        smooth: Whether moments between the footage's frames are exposed, too, if the effect wants that.
+        smooth: Whether frames computed between filmed ones are exposed, too, if the effect wants that.
     """
 
     divisor: int = 1
@@ -69,10 +69,11 @@ class SourceKey:
     Attributes:
         scene: session_uid of the effect scene.
         spec: The footage.
-        steps: Steps from a frame of the footage to the next; 1: no moments between.
-        skip_repeats: As in Options, if there are moments.
-        detail: Its `smooth` is True also for an effect that has no moments, so that its key does not depend on it.
-        folder: Folder in which optical flow vectors are stored; None: nowhere.
+        steps: Frames from a filmed frame to the next: 1, or n with n − 1 computed in between.
+        skip_repeats: Whether computed frames replace filmed ones that repeat the frame before. False if `steps` is 1.
+        detail: The wanted detail. Its `smooth` is True if the effect has no computed frames, whatever was wanted, so
+            that the key is the same.
+        folder: Folder in which optical flow vectors are stored; None: they are not stored.
     """
 
     scene: int
@@ -104,11 +105,12 @@ class SourceKey:
         """Open the footage.
 
         Args:
-            planes: Give frames as the decoder's planes where only their color conversion is missing (PrefetchSource).
-            keeps: Write newly computed optical flow vectors to `folder`.
+            planes: Whether frames may come as planes of luma and chroma (PrefetchSource) if `steps` is 1; else they
+                may anyway.
+            keeps: Whether to write newly computed optical flow vectors to `folder`.
 
         Raises:
-            EffectError, MediaError: It cannot be read.
+            EffectError, MediaError: The footage cannot be read.
         """
         medium = self.spec.open(self.detail.divisor, self.detail.proxy)
         if self.steps == 1:
@@ -129,9 +131,9 @@ def known_steps(snapshot: Snapshot) -> int | None:
 
 
 def find_steps(snapshot: Snapshot) -> int:
-    """Return how many steps lead from a frame of the footage to the next: 1, or n with n − 1 moments in between.
+    """Return how many steps lead from a filmed frame to the next: 1, or n if n − 1 frames are computed in between.
 
-    With *Smooth* on Automatic, the first call compares frames, which takes long.
+    With *Smooth* on Automatic, the first call for a footage compares frames, which takes long.
 
     Raises:
         EffectError, MediaError: The footage cannot be read.
@@ -147,12 +149,15 @@ def find_steps(snapshot: Snapshot) -> int:
 
 
 def steps_of(medium: FrameSource, smooth: int | str, window: int, *, skip_repeats: bool) -> int:
-    """Return how many steps lead from a frame of the footage to the next; 1 if the feature `smooth` is not installed.
+    """Return how many steps lead from a filmed frame to the next; 1 if the feature `smooth` is not installed.
+
+    The number may be less than wanted, so that the window does not get too long.
 
     Args:
-        smooth: The effect's option *Smooth*: a number of steps, or a word for automatic.
-        window: Length of the window in frames.
-        skip_repeats: Whether repeated frames are left out.
+        medium: The footage.
+        smooth: The effect's option *Smooth*: a number of steps, or "auto": as many as the motion needs.
+        window: Length of the effect's window in filmed frames.
+        skip_repeats: Whether frames that repeat the one before are replaced by computed ones.
     """
     for steps_for in features.each("steps_for"):
         return int(steps_for(medium, smooth, window, skip_repeats=skip_repeats))
@@ -180,9 +185,12 @@ def open_source(snapshot: Snapshot) -> ShotSource:
 
 
 def clip_of(snapshot: Snapshot, source: FrameSource) -> Clip:
-    """Return the size, length and timing of an effect's footage, as the model wants them.
+    """Return the size, length and timing of an effect's footage as plain data.
+
+    The timing is the effect's *Source Time* if that is keyed, otherwise the source strip's.
 
     Args:
+        snapshot: The effect.
         source: The opened footage.
     """
     return Clip.of(source, snapshot.effect.time or snapshot.timing)

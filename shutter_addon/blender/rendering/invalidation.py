@@ -19,12 +19,12 @@ from ..devices import main_thread
 
 @dataclass
 class _Frames:
-    """What is known of the frames that the sequencer may keep of effects, by session_uid of the effect scene.
+    """What is known of effects' frames in the sequencer's cache, by session_uid of the effect scene.
 
     Attributes:
-        signatures: effect_version.preview_key when they were made.
-        failed: Effect scenes of which a frame failed.
-        reduced: Effect scenes of which a frame has less than full quality, for a preview.
+        signatures: effect_version.preview_key of each effect when invalidate_changed last looked.
+        failed: Effects of which a picture failed. Their frames have to be dropped.
+        reduced: Effects of which a preview got a frame in less than full quality. Their frames have to be dropped.
     """
 
     signatures: dict[int, int] = field(default_factory=dict)
@@ -62,9 +62,12 @@ def drop_failed() -> None:
 
 
 def mark_reduced(scene: int) -> None:
-    """Note that the sequencer got a picture with less than full quality, of the effect scene with this session_uid.
+    """Note that the sequencer's cache got a picture of an effect in less than full quality, or none.
 
-    Blender would use it for renders, scopes and the color picker, too, so the draw handler drops it.
+    Blender would use the picture for renders, scopes and the color picker, too, so drop_reduced drops it soon.
+
+    Args:
+        scene: session_uid of the effect scene.
     """
     _frames.reduced.add(scene)
     main_thread.later(drop_reduced)  # in case the handler is not called
@@ -85,10 +88,12 @@ def _drop(noted: set[int]) -> None:
 
 
 def invalidate_changed(scene: Scene) -> bool:
-    """Drop the frames of a scene's effects whose keys, strokes or source have changed.
+    """Drop cached frames of a scene's effects whose keyframes, strokes or source changed since the last call.
 
-    Return whether an effect has changed. Current values of keyed properties do not count, as they change with every
-    frame that plays.
+    Current values of keyed properties do not count, as they change with every frame that plays.
+
+    Returns:
+        Whether an effect has changed. An effect that was not seen before has not.
     """
     if not scene.virtual_shutter.effects:
         return False

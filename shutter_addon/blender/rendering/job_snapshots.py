@@ -25,7 +25,9 @@ from .render_job import Where, job
 
 
 def begin(film: int) -> None:
-    """Read all effects that a film shows, before another thread renders it. Called on the main thread.
+    """Store snapshots of all effects that a film shows, or their errors, in job.film_data.taken.
+
+    Call this on the main thread, before the other thread renders.
 
     Args:
         film: session_uid of the rendered scene.
@@ -62,9 +64,10 @@ def end() -> None:
 
 
 def look(film: int) -> None:
-    """Find out again at which frames the sequencer leaves effects out, and why, for a render on another thread.
+    """Update job.film_data.left_out: at which frames the sequencer leaves effects out, and why.
 
-    The user may delete a camera during the render, for example.
+    Call this on the main thread when data changes during a render on another thread: the user may delete a camera, for
+    example.
 
     Args:
         film: session_uid of the rendered scene.
@@ -109,7 +112,8 @@ def of(effect_scene: Scene, scene_frame: float, ended: Callable[[], bool] | None
 def _of_film(scene: Scene, effect: PropertyGroup, strip: Strip, frame: float) -> Snapshot:
     """Return the snapshot for a timeline frame in the background: a kept one if it has the frame, else a new one.
 
-    A snapshot that is taken from a film's second frame on has all frames of the film.
+    The first snapshot of a strip in a render has only this frame and the next. The second one has all frames at which
+    the film shows the effect, and is kept, unless a script that runs at frames may change the edit.
     """
     key, frames = (effect.scene.session_uid, strip.name), {frame, frame + scene.frame_step}
     is_again = key in job.film_data.read and not render_job.scripts_act()
@@ -150,10 +154,12 @@ def shown_effects(film: Scene) -> Iterator[tuple[Scene, PropertyGroup, list[Stri
 
 
 def asked_frames(scene: Scene, parts: list[Strip], is_film: bool) -> set[float]:
-    """Return the timeline frames at which the engine may be asked for parts of a cut effect strip.
+    """Return the timeline frames at which the engine may be asked for an effect's strips, plus one or two on each side.
 
     Args:
-        is_film: Whether `scene` is the rendered one, so that only its frame range counts.
+        scene: The scene that has the strips.
+        parts: The effect strips: all parts of a cut one, or one of them.
+        is_film: Whether `scene` is the rendered one: then frames outside its frame range are left out.
     """
     first, last = scene.frame_start, scene.frame_end
     asked = set()

@@ -54,9 +54,9 @@ def picture(context: RenderContext, snapshot: Snapshot, frame: float, detail: De
 
 
 def _weights(renderer: Renderer, request: Request) -> list[np.ndarray]:
-    """Return the pictures (h, w) for the option --weights: the share of each shutter, then the matte of each layer.
+    """Return the pictures for the option --weights: the share of each shutter, then the matte of each visible layer.
 
-    Each has one pixel for each block of the picture's pixels that are exposed alike.
+    Each is (h, w), with one pixel for each block of Options.aggregate × Options.aggregate pixels of the picture.
     """
     block = request.state.options.aggregate
     mattes = [block_means(matte, block) for matte in renderer.layer_mattes(request)]
@@ -64,9 +64,10 @@ def _weights(renderer: Renderer, request: Request) -> list[np.ndarray]:
 
 
 def _write_weights(place: Path, snapshot: Snapshot, frame: float, weights: list[np.ndarray]) -> None:
-    """Write an EXR file with a channel for each shutter and, after these, for each layer, named after its region.
+    """Write the pictures for the option --weights to an EXR file.
 
-    A layer that is missing at this frame is empty. A name that is taken gets a number.
+    It has a channel for each shutter and, after these, for each layer, with the name of the shutter or region. A name
+    that is taken gets a number. A layer that is invisible at this frame is 0 everywhere.
 
     Args:
         place: The file.
@@ -118,7 +119,8 @@ def resized(picture: np.ndarray, width: int, height: int, divisor: int = 1) -> n
     """Return a picture (H, W, 4) at the size that Blender asks for, which is smaller with a resolution below 100 %.
 
     Args:
-        divisor: How many times smaller than the source the picture was composed; its pixels are repeated first.
+        divisor: How many times smaller than the source the picture was composed. Its pixels are repeated that often in
+            both directions before it is scaled.
     """
     if divisor > 1:
         picture = picture.repeat(divisor, axis=0).repeat(divisor, axis=1)[:height, :width]

@@ -39,12 +39,13 @@ RESULTS = "RESULT", "SPLIT", "EDGES"  # views of the live preview that show the 
 
 @dataclass
 class Whole:
-    """The picture that the user looks at with *Full Quality*.
+    """Which picture the user looks at with *Full Quality*.
 
     Attributes:
         scene: session_uid of the effect scene.
         frame: Timeline frame.
-        key: Request.key without its source, to notice changes; None: it was not drawn yet.
+        key: The picture's Request.key without its source; if it differs later, the effect has changed. None: not known
+            yet.
     """
 
     scene: int
@@ -59,11 +60,11 @@ class Decision:
     Attributes:
         snapshot: The effect.
         frame: Timeline frame.
-        request: The picture, in the detail that previews have.
-        is_drawn: Whether our draw handler shows it, so that the engine need not make one.
-        is_plain: Whether it is without moments between frames, and one with them follows.
-        is_late: Whether making it took so long that the engine was stopped, to let Blender handle events.
-        stopped: Tells that it takes too long and has to stop; None: Blender waits for it.
+        request: The picture to show.
+        is_drawn: Whether the draw handler draws it: then the engine makes none.
+        is_plain: Whether the picture lacks frames computed between filmed ones, and one with these follows.
+        is_late: Whether the engine was stopped before the picture was done, to let Blender handle events.
+        stopped: Returns True once making the picture has to pause for Blender; None: it may take as long as it needs.
     """
 
     snapshot: Snapshot
@@ -81,9 +82,9 @@ class Drawing:
 
     Attributes:
         decision: What the preview shows.
-        request: The picture to draw, as a draft where it need not be exact.
+        request: The picture to draw, possibly as a draft (previews.draft).
         renderer: Makes the picture.
-        left: Fraction of the picture's width from the left where the source is shown instead of the result.
+        left: Width of the part at the left that shows the source, as a fraction of the picture's width.
         draws_result: Whether the handler draws the result; otherwise Blender shows it.
     """
 
@@ -96,10 +97,10 @@ class Drawing:
 
 @dataclass
 class _Pen:
-    """What drawing strokes has changed in the previews.
+    """What drawing strokes has changed in the previews, to restore it later.
 
     Attributes:
-        channel: Display channel that the previews show; 0: the result.
+        channel: *Display Channel* that was set to show the source strip; 0: none was set.
         tool: Tool that *Draw* or *Erase* replaced, to restore after the stroke; "": none.
         is_down: Whether the pen was down when a preview was last drawn.
     """
@@ -111,15 +112,16 @@ class _Pen:
 
 @dataclass
 class _Looking:
-    """The state of the window's previews.
+    """The state of all previews.
 
     Attributes:
-        whole: The picture in full quality; None: none is shown so.
+        whole: The picture that the user looks at with *Full Quality*; None: that is off.
         late_until: Time (time.monotonic) until which pictures may be late, because the user scrubs or tracks.
-        decision: What the engine was asked for, for the draw handler that Blender calls next.
-        slices: The slices of time in which a slow picture is made, between redraws.
+        decision: What for_engine has decided in this redraw, for take_decision; None: nothing.
+        slices: The limits of time in which a slow picture is made piece by piece, between redraws.
         pen: What drawing strokes has changed.
-        emptied: Addresses of spaces from which an effect's annotation was taken.
+        emptied: Addresses (as_pointer) of sequencer spaces from which an effect's annotation was taken, so that they
+            get one again.
     """
 
     whole: Whole | None = None
@@ -134,7 +136,10 @@ looking = _Looking()
 
 
 def for_engine(context: Context, effect_scene: Scene) -> Decision | None:
-    """Return what the engine has to make while Blender draws a preview; None: the picture is not for a preview.
+    """Return what the engine has to make while Blender draws a preview, and keep it for take_decision.
+
+    Returns:
+        The decision. None: the picture is not for a preview, or an operator or tool reads it. It then has full quality.
 
     Raises:
         effect_source.FAULTS: The effect cannot be shown.
@@ -169,7 +174,7 @@ def for_drawing(context: Context, shown: Shown, decision: Decision | None) -> Dr
 
     Args:
         shown: The effect strip that the preview shows.
-        decision: What for_engine decided, which holds unless the effect has changed since; None: nothing was decided.
+        decision: What for_engine decided in this redraw. None, or if the effect has changed since: decide anew.
 
     Raises:
         effect_source.FAULTS: The effect cannot be shown.
@@ -215,9 +220,13 @@ def _snapshot(shown: Shown) -> Snapshot:
 
 
 def _requested(context: Context, shown: Shown, snapshot: Snapshot, look: Look) -> tuple[Request, bool]:
-    """Return what _best returns, in the detail of previews or, while *Full Quality* is on, in full detail.
+    """Return _best's request for the shown frame, in full detail while *Full Quality* is on, else in that of previews.
 
-    *Full Quality* ends here when another frame is shown or the effect has changed.
+    *Full Quality* ends here if another frame is shown, the effect has changed, the film plays, or the user scrubs or
+    tracks.
+
+    Returns:
+        The request, and whether a better picture follows (_best).
     """
     frame = shown.scene.frame_current
     whole = looking.whole
@@ -231,9 +240,11 @@ def _requested(context: Context, shown: Shown, snapshot: Snapshot, look: Look) -
 
 
 def _best(context: Context, snapshot: Snapshot, frame: float, detail: effect_source.Detail) -> tuple[Request, bool]:
-    """Return the request for a picture with moments between frames, or without them while that is not ready.
+    """Return the best picture that a preview can show now.
 
-    The second value tells whether the picture is without moments and one with them follows.
+    Returns:
+        The request, and whether it is a stand-in: a picture without frames computed between filmed ones, shown until
+        the one with them is ready. An operator or tool that reads the picture never gets a stand-in.
     """
     render = sessions.of_drawing()
     if not is_read(context) and detail.smooth:
@@ -246,8 +257,12 @@ def _best(context: Context, snapshot: Snapshot, frame: float, detail: effect_sou
 def _detail(context: Context, look: Look) -> effect_source.Detail:
     """Return the detail that all previews of a scene share.
 
-    The divisor is the one of reduced.DIVISORS that fits the largest preview, or its proxy, best. While playing and in
-    views other than the result, pictures have no moments between frames, because optical flow takes long.
+    The divisor is the one of reduced.DIVISORS that makes the picture about as large as the largest preview. While
+    playing, scrubbing or tracking, and in views without the result, no frames are computed between filmed ones, because
+    optical flow takes long.
+
+    Args:
+        look: How previews show the effect. Without a scale, the detail is full.
     """
     if (scale := look.scale) is None:
         return effect_source.FULL
@@ -263,7 +278,7 @@ def _is_drawn(context: Context, shown: Shown, look: Look, source: FrameSource, *
 
     Args:
         source: The opened footage, in the previews' size.
-        is_less: Whether a better picture will follow.
+        is_less: Whether the picture is plain, or drawn while the film plays or the user scrubs: a better one follows.
     """
     settings = context.window_manager.virtual_shutter
     is_small = source.from_proxy or source.width < annotations.picture_size(shown.effect)[0]
@@ -300,7 +315,7 @@ def _is_rendered(shown: Shown) -> bool:
 def _time_up(context: Context, request: Request) -> Slice:
     """Return a function that returns True once making the picture has to pause, so that Blender can handle events.
 
-    Making the picture goes on in the next redraw.
+    The picture goes on in the next redraw. While the film plays, each frame gets one second.
     """
     key = request.key
     if _is_playing(context):
@@ -310,12 +325,12 @@ def _time_up(context: Context, request: Request) -> Slice:
 
 
 def refine() -> None:
-    """Work for a moment on pictures with moments between frames, which will replace those that are drawn now.
+    """Work for about 0.15 s on pictures with frames computed between filmed ones, which will replace drawn plain ones.
 
-    Pause this work while the pen is down or while a slow picture is being made.
+    While the pen is down, drop this work; while a slow picture is being made, let it rest.
 
     Raises:
-        effect_source.FAULTS: One cannot be made.
+        effect_source.FAULTS: A picture cannot be made.
     """
     if pen_is_down():
         features.call("rest_smooth")

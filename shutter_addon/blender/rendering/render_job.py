@@ -60,14 +60,15 @@ class Where(Enum):
 
 @dataclass
 class FilmData:
-    """What is kept for the running job or film. Effects are known by the session_uid of their effect scene.
+    """What is kept for the running job or film. Effects are identified by the session_uid of their effect scene.
 
     Attributes:
-        taken: Of a job: timeline frames and snapshot of each part of a cut strip, or why there is none.
-        read: Of a film in the background: the snapshot by effect scene and strip; None: read once, for one frame.
+        taken: Of a job: for each effect, (timeline frames, snapshot) of each part of its cut strip, or the error that
+            prevents it.
+        read: Of a film in the background: the snapshot for (effect, strip name); None: read, but not kept.
         pictures: Of a job: the last picture of each effect, shown until the next is made.
-        left_out: Of a job: what requirements.left_out returned.
-        feed: Of a film in the background: how the edit was changed (output.edit_feed), or None.
+        left_out: Of a job: what requirements.left_out returned: (timeline frames, reason) of strips without a picture.
+        feed: Of a film in the background: the state of output.edit_feed; None: it is not used.
     """
 
     taken: dict[int, list[tuple[range, Snapshot]] | Exception] = field(default_factory=dict)
@@ -89,13 +90,14 @@ class _Job:
         tell: Called with that sentence.
         cancelling: Whether the small render is running whose error ends this one (_cancel).
         waited_for: Whether the window waits for every picture (Where.WAITED_FOR).
-        spent: Names of scenes and cameras of small renders (_cancel).
+        spent: Names of scenes and cameras of small renders, which are still to be removed (_cancel).
         said: Sentences that were said (say_once).
         film_data: What is kept for the running job or film.
-        device: One of available.CHOICES, of a command; None: the user's.
-        weights: Folder for the coefficients of every picture, as EXR files, of a command; None: none.
-        gpu_memory: Megabytes of the GPU that textures may take, of a command; 0: as device.allowed; None: the user's.
-        budget: The megabytes that were wanted, and the budget made of them; None: not made yet.
+        device: The device by a command's option, one of available.CHOICES; None: the user's preference.
+        weights: Folder for the shares of shutters in every picture, as EXR files (--weights); None: do not write them.
+        gpu_memory: Megabytes of GPU memory that textures may take, by a command's option; 0: an automatic limit; None:
+            the user's preference.
+        budget: The megabytes that were wanted (0: automatic), and the budget made of them; None: not made yet.
     """
 
     film: int | None = None
@@ -231,13 +233,14 @@ def scripts_act() -> bool:
 
 
 def on_main_thread(function: Callable[[], T], ended: Callable[[], bool] | None = None) -> T | None:
-    """Have Blender's main thread call a function, and return the result.
+    """Call a function and return its result: on Blender's main thread if this is a job's thread, otherwise here.
 
     Args:
+        function: The function. Its errors are raised to the caller.
         ended: Called to tell whether the result is no longer wanted; None: wait for _LONG seconds at most.
 
     Returns:
-        The function's result; None: the wait ended before the call began, and the function is not called.
+        The function's result; None: waiting ended before the call began, and the function is not called.
     """
     if where() is not Where.JOB:
         return function()
@@ -274,11 +277,12 @@ def fail(text: str) -> None:
 def cancel(ended: Callable[[], bool] | None = None) -> None:
     """End the running render, as soon as the caller returns to Blender.
 
-    To be called while a picture is made, or from a handler before a frame. (After a frame, Blender would go on with the
+    Call this while a picture is made, or from a handler before a frame. (After a frame, Blender would go on with the
     next, and crash.)
 
     Args:
-        ended: Called to tell whether the window has ended the render meanwhile; None: wait for _LONG seconds at most.
+        ended: Called on a job's thread to tell whether the window has ended the render meanwhile; None: wait for _LONG
+            seconds at most.
     """
     if where() is Where.JOB:
         on_main_thread(_cancel_and_show, ended)
@@ -311,8 +315,7 @@ def popup(words: str, **looks: str) -> None:
 def _cancel() -> None:
     """End the running render by starting a small one with our engine, which fails.
 
-    An engine's error ends renders if it reaches an operator. Errors from within the sequencer reach none, so a small
-    render beside it fails.
+    Blender ends renders if an engine's error reaches a render operator. Errors of pictures in the sequencer do not.
     """
     if job.cancelling:
         return
