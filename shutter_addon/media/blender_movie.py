@@ -37,8 +37,8 @@ class _Decoder:
     Attributes:
         command: The command that starts it. None: movies cannot be decoded this way.
         process: The running process, or None.
-        asking: Held while a question waits for its answer, from any thread.
-        numbers: Numbers under which the process knows movies; a file may be open several times.
+        asking: Lock that a thread holds from a question to its answer.
+        numbers: Gives each BlenderMovie the number by which the process knows it; paths can occur several times.
     """
 
     command: list[str] | None = None

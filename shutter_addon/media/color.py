@@ -26,13 +26,13 @@ def in_colorspace(source: FrameSource, name: str, config: str | Path | None) -> 
     Args:
         source: The footage.
         name: Blender's name of the color space.
-        config: The OpenColorIO configuration; not needed for sRGB and Linear Rec.709.
+        config: The OpenColorIO configuration; not needed for sRGB, Linear Rec.709 and Non-Color.
 
     Returns:
-        The source itself with another `transfer`, or a ColorSource that converts its frames.
+        For these three, the source itself with its `transfer` set. Otherwise a ColorSource that converts its frames.
 
     Raises:
-        MediaError: The configuration has no such color space.
+        MediaError: There is no configuration, or it has no such color space.
     """
     if name in TRANSFERS:
         source.transfer = TRANSFERS[name]
@@ -42,9 +42,10 @@ def in_colorspace(source: FrameSource, name: str, config: str | Path | None) -> 
 
 @cache
 def keeps(name: str, config: str | Path) -> bool:
-    """Return whether 8-bit sRGB colors survive a conversion to a color space and back, within less than a level.
+    """Return whether 8-bit sRGB colors survive a conversion to a color space and back, with an error below 1 / 255.
 
-    If the configuration cannot convert to the color space and back, return True.
+    Blender's sequencer converts strips like this to blend them, which may change colors. If the configuration cannot
+    convert to the color space and back, return True.
 
     Args:
         name: Blender's name of the color space.
@@ -109,7 +110,7 @@ def shown(light: np.ndarray) -> np.ndarray:
 def blended(light: np.ndarray) -> np.ndarray:
     """Encode light like `shown`, but with the rounding of strips that Blender's sequencer blends.
 
-    It encodes such light, decodes it and encodes it again.
+    The sequencer encodes their light, decodes it and encodes it again.
     """
     return _transformed(light, (_ENCODE, _DECODE, _ENCODE))
 

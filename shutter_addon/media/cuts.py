@@ -94,7 +94,7 @@ def is_cut(before: list[Signature], after: list[Signature]) -> bool:
     each part, and the pictures must have nothing in common even if the camera jumped.
 
     Not found are cuts between similar pictures, and some cuts to shots of one or two frames. Found by mistake are
-    lasting changes of a whole still picture, and jumps of the camera by more than 1 / REACH.
+    lasting changes of a whole still picture, and jumps of the camera by more than 1 / REACH of the picture.
 
     Args:
         before: Signatures of up to NEIGHBOURS successive frames, fewer only at the clip's start.
@@ -132,8 +132,8 @@ def _shared(picture: Signature, down: int, right: int) -> Signature:
     """Return the part of a frame's small picture that another frame also shows if the camera jumped.
 
     Args:
-        picture: The small picture.
-        down, right: The jump in pixels of the small picture.
+        down, right: The jump of the camera from this frame to the other one, in pixels of the small picture; may be
+            negative.
     """
     height, width = picture.shape[:2]
     return picture[max(down, 0) : height + min(down, 0), max(right, 0) : width + min(right, 0)]
@@ -142,10 +142,8 @@ def _shared(picture: Signature, down: int, right: int) -> Signature:
 def _differ(before: Signature, after: Signature, least: float, share: float = 1.0) -> bool:
     """Return whether brightness changes enough between the small pictures of two frames, or between parts of them.
 
-    Args:
-        before, after: The pictures.
-        least: The least change in levels of 255.
-        share: The least share of the change that a cut makes, which is less in dark pictures.
+    Enough is `share` · CHANGE (in pictures darker than GREY, proportionally less), but at least `least`, in levels of
+    255.
     """
     threshold = max(share * CHANGE * min(max(before.mean(), after.mean()) / GREY, 1.0), least)
     return _change(before, after) >= threshold
@@ -178,7 +176,7 @@ def _moving(pictures: list[Signature]) -> list[Signature]:
 
 
 def _change(before: np.ndarray, after: np.ndarray) -> float:
-    """Return the mean change of brightness (the largest color) between small pictures of two frames, in levels of 255.
+    """Return the mean change of brightness (maximum of R, G, B) between two frames' small pictures, in levels of 255.
 
     This is the score of PySceneDetect's ContentDetector for luma.
     """
@@ -229,8 +227,8 @@ class ShotSource(SourceWrapper):
     Cuts are cached, unless a frame could not be read.
 
     Attributes:
-        step: Every step-th frame was filmed.
-        filmed: The number of filmed frames.
+        step: Frames 0, step, 2 · step … were filmed. Those between them are moments: computed.
+        filmed: How many frames were filmed.
     """
 
     def __init__(self, source: FrameSource, step: int = 1) -> None:
@@ -260,9 +258,9 @@ class ShotSource(SourceWrapper):
     def around(self, index: int, low: int, high: int, *, known: bool = False) -> range:
         """Return the frames of the shot around a frame, between the cuts found in `low` … `high` (ShotFinder.around).
 
-        With `known`, only cuts that are known already count, and nothing is read. Otherwise, this reads frames that
-        have no signature yet, in ascending order: those from `low` to the first cut after `index`, and NEIGHBOURS
-        frames on each side of a possible cut.
+        On a side without a cut, the shot extends to the clip's start or end. With `known`, only cuts that earlier calls
+        found count, and nothing is read. Otherwise, this reads filmed frames that have no signature yet, in ascending
+        order: those from `low` to the first cut after `index`, and NEIGHBOURS frames on each side of a possible cut.
         """
         if known:
             return self._shot(index, low, high, self._cuts.get)
@@ -274,7 +272,8 @@ class ShotSource(SourceWrapper):
     def _shot(self, index: int, low: int, high: int, is_cut: Callable[[int], bool | None]) -> range:
         """Return the frames of the shot around `index`, between the cuts in `low` … `high`.
 
-        `is_cut` tells whether a filmed frame, given by its number, follows a cut.
+        `is_cut` tells whether there is a cut before a filmed frame, given by its number among filmed frames. None
+        (unknown) counts as no.
         """
         first = 0
         for i in self._after(low, high):

@@ -48,10 +48,12 @@ class File(NamedTuple):
 class FrameReader:
     """Reads frames of one video stream of a file, for one thread at a time. It keeps two frames in memory.
 
+    Attributes are set when `first` or `frame_at` opens the file.
+
     Attributes:
         time_base: The unit of time stamps in seconds.
-        start: The stream's first time stamp.
-        tags: The stream's YUV matrix and range (`_tags`).
+        start: The stream's first time stamp, in this unit.
+        tags: The number of the stream's YUV matrix, and whether its range is full (`_tags`).
     """
 
     def __init__(self, path: Path, number: int = 0) -> None:
@@ -73,7 +75,7 @@ class FrameReader:
         return run.file, run.shown.frame
 
     def frame_at(self, time: float, step: float) -> av.VideoFrame:
-        """Return the frame shown at a time: the one before the first later frame, or the file's first frame.
+        """Return the frame shown at a time: the one before the first frame with a later time stamp, or the first one.
 
         Blender chooses the same frame, also where time stamps go back.
 
@@ -141,7 +143,8 @@ class FrameReader:
         """Seek to a key frame near the time stamp `start`, and decode from there.
 
         Returns:
-            The decode (`_Run`). None: the seek fails, the first frame is later than `time`, or it needs earlier ones.
+            The decode (`_Run`). None: the seek fails, no frame follows, or the first one is later than `time` or refers
+            to earlier frames.
         """
         try:
             file.container.seek(start, stream=file.stream)

@@ -52,9 +52,11 @@ class CameraTrack(tracking.Track):
         return self._begun.get(frame) or super()._placement(frame)
 
     def _onward(self, start: int, frames: range) -> Iterator[Tracked]:
-        """Yield where the camera is at frames on one side of `start`; after a fault, go on once frames can be compared.
+        """Yield where the camera is at frames on one side of `start`, also beyond cuts and failures.
 
-        A cut alone is no fault, because no window goes across cuts.
+        After these, tracking begins again with the last placement, at the first frame that can be compared with the
+        next one. A Tracked with a fault marks the place, unless tracking goes on right after a cut: no exposure goes
+        across cuts.
         """
         last, fault = Tracked(frame=start, placement=self._placement(start), confidence=1.0), None
         for tracked in self._from(start, frames):
@@ -115,8 +117,8 @@ class _Pursuit:
     """The camera's motion from the frame where tracking starts to one frame after another.
 
     Attributes:
-        anchor: What stands still in the frame that others are compared with, that frame, and the motion from the first
-            frame to it.
+        anchor: The frame that others are compared with: what stands still in it, its number, and the motion to it from
+            the frame where tracking starts.
     """
 
     reason = UNLIKE
@@ -154,8 +156,11 @@ class _Pursuit:
     def _explained(self, picture: np.ndarray, frame: int, motion: Similarity) -> float:
         """Return how well a motion explains the whole picture, 0 to 1.
 
-        Parts (cells) of an earlier frame that are not where the motion takes them count against it. Moving things fill
-        few cells; when the camera moves through a scene, many are elsewhere.
+        An earlier frame is divided into cells. Many cells whose corners are not where the motion takes them lower the
+        result; few do not, since things may move. If the camera moves through a scene, there are many.
+
+        Args:
+            motion: From the frame where tracking starts to `frame`.
         """
         part, _, known = self._older[0]
         points, off = part.astray(picture, motion.after(known.inverse()))
@@ -167,10 +172,13 @@ class _Pursuit:
         return float(np.clip((_MOST - np.mean(astray)) / (_MOST - _FEW), 0, 1)) if astray else 1.0
 
     def _compared(self, picture: np.ndarray, anchor: tuple[Part, int, Similarity]) -> FoundMotion:
-        """Find the motion from the first frame to a picture, by comparison with an anchor frame.
+        """Find the motion from the frame where tracking starts to a picture, by comparison with an anchor frame.
 
         The search starts where the camera would be at its last speed. If nothing is found, the last motion is returned
         with confidence 0.
+
+        Args:
+            anchor: What stands still in that frame, its number, and the motion to it, as in the attribute.
         """
         (part, _, motion), known = anchor, self._last[1]
         match = part.find(picture, self._speed.after(known).after(motion.inverse()), self._motion)

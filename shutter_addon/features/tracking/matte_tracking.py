@@ -37,7 +37,7 @@ _AGREEING = 0.5  # share of such points from which on a step is sure
 
 
 def cover_within(drawn: Callable[[int], Sequence]) -> Cover:
-    """Return a function that gives the matte of drawn curves, for MatteTrack.
+    """Return a function that gives MatteTrack the matte of a drawn outline: the inside of closed curves.
 
     Args:
         drawn: Returns the curves at a timeline frame.
@@ -48,14 +48,16 @@ def cover_within(drawn: Callable[[int], Sequence]) -> Cover:
 def follow_carried(
     region: Subject, file: SourceFile, shown: Mapping[float, int], *what: Any, **how: Any
 ) -> Iterator[Tracked]:
-    """Track what a tracked outline or a subject covers, by its mattes. Yield what MatteTrack.follow yields.
+    """Track a region whose mattes are computed: an outline tracked between drawings, or a subject.
+
+    Yield what MatteTrack.follow yields.
 
     Args:
         region: Gives its center, and its location, rotation and scale where tracking starts.
-        file: Makes and reads its mattes.
-        shown: The frame of the footage for each timeline frame.
-        what: Arguments of MatteTrack.follow.
-        how: Keyword arguments of it.
+        file: Opens a source of its mattes, one for each frame of the footage.
+        shown: The number of the frame of the footage by timeline frame.
+        what: Positional arguments of MatteTrack.follow.
+        how: Its keyword arguments.
 
     Raises:
         MediaError: A matte cannot be made.
@@ -120,11 +122,13 @@ class _Pursuit:
         return Similarity(1 + 0j, self._motion(middle) - middle)
 
     def _refined(self, motion: Similarity, second: np.ndarray, after: np.ndarray) -> Similarity:
-        """Correct a motion since the first frame by comparison with that frame, so that steps do not add up to a drift.
+        """Correct a motion by comparison with the frame where tracking starts, so that errors of steps do not add up.
+
+        If the comparison is unsure, or the correction larger than a drift can be, return the motion unchanged.
 
         Args:
-            motion: From the first frame, added up from steps.
-            second: The picture that it leads to, (H, W) uint8.
+            motion: From that frame to `second`, added up from steps.
+            second: The current picture, (H, W) uint8.
             after: The matte of that picture, (H, W) float32.
         """
         there = registration.matrix(motion)
@@ -142,7 +146,7 @@ class _Pursuit:
 def moved(
     first: np.ndarray, second: np.ndarray, before: np.ndarray, after: np.ndarray, motion: Motion
 ) -> FoundMotion | None:
-    """Find the motion of what a matte covers from one picture to another; None: too little is certain.
+    """Find the motion of what a matte covers from one picture to another; None: too few points agree on one.
 
     Args:
         first: Grey picture, (H, W) uint8.

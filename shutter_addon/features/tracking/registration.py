@@ -50,12 +50,12 @@ class Match:
 
     Attributes:
         motion: From the part's picture to the other one.
-        agreeing: (n,) bool: the corners that move like this.
-        seen: (n,) bool: the corners inside the other picture.
-        share: Weight of the agreeing corners, as a fraction of that of the corners inside the picture.
-        visible: Weight of the corners inside the picture, as a fraction of that of all.
-        error: Expected error at the part's farthest point, in pixels.
-        held: Places of the agreeing corners in the other picture.
+        agreeing: Which of the part's corners move like this, (n,) bool.
+        seen: Which corners are expected inside the other picture, (n,) bool.
+        share: Total weight of the agreeing corners, as a fraction of that of the seen ones.
+        visible: Total weight of the seen corners, as a fraction of that of all.
+        error: Standard error of the motion, in pixels, where it is largest in the part's bounding box.
+        held: Positions of the agreeing corners in the other picture, (k,) complex.
         likeness: Correlation of the part's pixels with the picture there, −1 to 1.
     """
 
@@ -70,7 +70,7 @@ class Match:
 
 
 class Part:
-    """A part of a picture that can be found in other pictures, by its corners.
+    """A part of a picture that can be found in other pictures, by its corners: points that optical flow can follow.
 
     Corners have weights: how much they belong to the part. `learn` lowers those of corners of the background.
     """
@@ -121,11 +121,11 @@ class Part:
 
         Args:
             picture: (H, W) uint8.
-            known: Motion to where it was; rotation and scale stay so.
+            known: Motion from the part's own picture to the place around which to search. Rotation and scale stay so.
             radius: How far from there to search, in pixels.
 
         Returns:
-            None if there is no room for the part in the picture.
+            The motion from the part's own picture. None: nowhere there does the whole part fit into the picture.
         """
         scores, alone, around = self._scores(picture, known, radius)
         _, likeness, _, best = cv2.minMaxLoc(scores)
@@ -135,7 +135,7 @@ class Part:
         """Tell whether something elsewhere in a picture looks nearly as much like the part as its own place does.
 
         Args:
-            known: Motion to the part's place in this picture.
+            known: Motion from the part's own picture to its place in this one.
         """
         scores, _, _ = self._scores(picture, known, max(picture.shape))
         y, x = (length // 2 for length in scores.shape)
@@ -147,15 +147,16 @@ class Part:
     def _scores(
         self, picture: np.ndarray, known: Similarity, radius: float
     ) -> tuple[np.ndarray, Similarity, Similarity]:
-        """Correlate the part with a picture, at each place around a known one.
+        """Correlate the part with a picture, at each place around a known one. Both are reduced, which saves time.
 
         Args:
-            known: Motion to the known place.
+            known: Motion from the part's own picture to the known place.
             radius: How far from there, in pixels.
 
         Returns:
-            The correlations, with the known place in their middle and _NOWHERE outside the picture; and the motions to
-            the reduced pictures of the part and of its surroundings.
+            The correlations (rows, columns), with the known place in the middle, and _NOWHERE where the part does not
+            fit into the picture; the motion from the part's own picture to its reduced one; and that from `picture` to
+            the reduced picture of the surroundings.
         """
         x, y, width, height = self.box
         middle = complex(x + width / 2, y + height / 2)
@@ -177,9 +178,9 @@ class Part:
     def rival(self, radius: float) -> float:
         """Return how much the part's surroundings look like it, 0 to 1: how easily tracking slips onto them.
 
-        It is the highest correlation with its own picture, displaced by up to `radius` pixels, outside the peak at no
-        displacement; 0 if none is above ALIKE. Shading that is coarser than the windows does not count, since it does
-        not distinguish corners.
+        It is the highest correlation of the part with places up to `radius` pixels away in its own picture, apart from
+        the peak around the part's place; 0 if none is above ALIKE. Gradual shading, which does not distinguish corners,
+        is ignored.
         """
         x, y, width, height = self.box
         room = round(radius)
@@ -199,10 +200,11 @@ class Part:
         """Return how far corners of the part are from where a known motion takes them, in another picture.
 
         Args:
-            known: The motion to that picture.
+            known: The motion from the part's own picture to that one.
 
         Returns:
-            The corners that are found, in the part's own picture, (n,), and their distances in pixels, (n,).
+            Positions of the corners that were found, in the part's own picture, (n,) complex; and how far each is off,
+            in pixels of it, (n,).
         """
         moved, good = self._flow(picture, known)
         good &= inside(picture, known(self.points))
@@ -241,10 +243,11 @@ class Part:
         """Find each corner in another picture by optical flow, near where a guess takes it.
 
         Args:
-            guess: The motion to expect.
+            guess: The motion to expect, from the part's own picture to this one.
 
         Returns:
-            The places (n,), moved back by the guess, and whether flow leads from there back to the corner (n,) bool.
+            Where each corner is found, after undoing the guess: the corner itself if the guess is right, (n,) complex.
+            And whether flow from there leads back to the corner, (n,) bool.
         """
         size, flags = self._picture.shape[::-1], cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
         back = cv2.warpAffine(picture, matrix(guess, self._origin), size, flags=flags)
@@ -254,7 +257,7 @@ class Part:
     def _likeness(self, picture: np.ndarray, motion: Similarity) -> float:
         """Return the correlation of the part's pixels with another picture where a motion takes them, −1 to 1.
 
-        Both are reduced, and only what is inside that picture counts.
+        Both are reduced, and only what is inside that picture counts; 0 if nothing is.
         """
         x, y, width, height = self.box
         share = min(1.0, _SOUGHT / max(width, height))
@@ -367,13 +370,16 @@ def fit(
 
 
 def _hypotheses(p: np.ndarray, q: np.ndarray, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
-    """Return candidates for a similarity from points p to points q (n,), each made from one or two pairs.
+    """Return candidates for a similarity that takes points p to points q (n,), from which `fit` chooses (RANSAC).
+
+    Each is made from one pair of a point and its target (motion "location") or from two.
 
     Args:
         motion: What may change, one of MOTIONS.
 
     Returns:
-        Factors (rotation and scale, as complex numbers) and shifts, (k,) each.
+        For k candidates: factors (k,) (rotation and scale as a complex number) and shifts (k,). A point z moves to
+        factor · z + shift.
     """
     count = len(p)
     shifts = (q - p)[:: -(-count // _HYPOTHESES)]
@@ -424,7 +430,7 @@ def _expected_error(
         points: The agreeing corners (n,).
         off: How far the motion misses each, in pixels (n,).
         weights: Of the corners (n,).
-        ends: The points to find the error at.
+        ends: The corners of the part's bounding box (4,).
         motion: What was fitted, one of MOTIONS.
     """
     count = max(len(points) / 4, 1.0)

@@ -65,13 +65,13 @@ class TrackingError(MediaError, ValueError):
 
 @dataclass(frozen=True)
 class Tracked:
-    """Where tracking has placed a region or the camera at a frame, or why it ended there.
+    """Where tracking has placed a region or the camera at a frame, or why it failed there.
 
     Attributes:
         frame: Timeline frame.
-        placement: Location, rotation and scale.
-        confidence: How sure this is, 0 to 1.
-        fault: Why tracking ended before this frame, which then gets no key; "": it did not end.
+        placement: Location, rotation and scale; with a fault, those of the last frame found before.
+        confidence: How sure the placement is, 0 to 1. 0 is a guess between frames in which it was found, or a fault.
+        fault: "": none. Otherwise why tracking stopped before this frame (in its direction), which gets no keyframe.
     """
 
     frame: int
@@ -81,12 +81,12 @@ class Tracked:
 
 
 class FoundMotion(NamedTuple):
-    """A motion from the first picture to another one that was found by tracking.
+    """A motion that was found, from the picture where tracking began to another one.
 
     Attributes:
         motion: The motion.
         confidence: How sure it is, 0 to 1.
-        held: The corners that agree with it, as points in the other picture, (n,) complex.
+        held: Positions in the other picture of the corners that agree with it, (n,) complex; empty if not needed.
     """
 
     motion: Similarity
@@ -146,13 +146,12 @@ class PartTracker:
     def _trusted(self, picture: np.ndarray, sighting: FoundMotion, goes_on: bool) -> float:
         """Return how sure it is that what was found is still the part, 0 to 1.
 
-        If only a share of the corners comes from the part's last place, it is that share as sure as before. If all do,
-        it is at least as sure as the likeness to the first look says, unless the part was lost and something else looks
-        like it, too.
+        This is the trust of the picture before (0 if the part was not found there), times the result of `_held`. If
+        that is 1 or None, it rises to the confidence of what was found; but not if the part was lost or unsure, and
+        something else in the picture looks like it, too.
 
         Args:
-            picture: The picture.
-            sighting: What was found in it.
+            sighting: What was found in the picture.
             goes_on: Whether the part was found in the picture before.
         """
         held = self._held(picture, sighting) if goes_on else None
@@ -163,9 +162,10 @@ class PartTracker:
         return kept if was_lost and self._first.lookalike(picture, sighting.motion) else sighting.confidence
 
     def _held(self, picture: np.ndarray, sighting: FoundMotion) -> float | None:
-        """Return which share of the found corners, traced back some pictures, was at the part's place there, 0 to 1.
+        """Return how far the found corners come from the part, 0 to 1; None: too few can be traced back.
 
-        Corners come from elsewhere if tracking slipped onto something else. None: too few can be traced back.
+        They are traced back some pictures by optical flow. If tracking slipped onto something else, they are not at the
+        part's place there. The result is the share that is, divided by _AGREEING; at most 1.
         """
         pictures, back = [picture, *(each[0] for each in reversed(self._seen))], sighting.motion.inverse()
         step = self._known.after(back)(sighting.held) - sighting.held
@@ -211,10 +211,13 @@ class PartTracker:
             self._look = _Look(later, motion, max(_DRIFT * worth, _LEAST))
 
     def _elsewhere(self, picture: np.ndarray, missed: int) -> FoundMotion | None:
-        """Search for a part that was lost, by its first look and a later one, in the area where it may be by now.
+        """Search a larger area around its last place for a part that was lost, by its first look and a later one.
 
         Args:
-            missed: Pictures since it was last found.
+            missed: The number of pictures in a row, before this one, in which it was not found. The area grows with it.
+
+        Returns:
+            The surest result; None: it is not found.
         """
         radius = _AROUND * picture.shape[1] * (1 + missed / 4)
         sightings = []
@@ -233,7 +236,7 @@ class _Look:
 
     Attributes:
         part: The part, taken from that picture.
-        motion: From the first picture to that one.
+        motion: From the picture where tracking began to that one.
         worth: How sure it is that this was the part, 0 to 1.
     """
 
@@ -242,10 +245,12 @@ class _Look:
     worth: float
 
     def find(self, picture: np.ndarray, guess: Similarity, motion: Motion) -> FoundMotion | None:
-        """Find the part in a picture by its motion, or by location alone if corners disagree; None: it is not found.
+        """Find the part in a picture; None: it is not found.
+
+        If its corners do not agree on a motion of the wanted kind, only its location is found, with less confidence.
 
         Args:
-            guess: Motion to expect from the first picture.
+            guess: The motion to expect, from the picture where tracking began, as that of the result.
             motion: What changes, as in Track.follow.
         """
         guess = guess.after(self.motion.inverse())
@@ -277,10 +282,11 @@ def confidence(match: Match | None, picture: np.ndarray) -> float:
 def lost(frames: np.ndarray, sure: np.ndarray) -> int | None:
     """Return the frame at which a subject was lost; None: nowhere.
 
-    That is where the first long stretch of unsure frames begins or, if it begins at the first frame, where it ends.
+    That is the first frame of the first long stretch of unsure frames. If this begins with the first frame of all,
+    tracking came from later ones, and it is the last frame of the stretch.
 
     Args:
-        frames: (n,), ascending.
+        frames: Tracked timeline frames (n,), ascending.
         sure: (n,), how sure tracking was at each, 0 to 1.
     """
     ends = np.flatnonzero(np.diff(np.concatenate([[False], sure < SURE, [False]])))
@@ -324,16 +330,17 @@ class Track(ABC):
     ) -> Iterator[Tracked]:
         """Yield where the subject is (Tracked) at timeline frames: at `start`, then after it, then before it.
 
-        A direction that ends early ends with a Tracked that has a fault. If a gap is left on the way to an anchor,
-        there is a fault on each side of it.
+        If tracking ends early in a direction, the last Tracked there has a fault. If frames on the way to an anchor are
+        not found from either side, there is a fault at each end of the gap.
 
         Args:
             footage: The pictures.
-            start: The first frame.
-            frames: All frames that may be tracked, with `start`.
-            motion: What changes: "location", also "rotation", or also "scale".
-            anchors: Frames where the subject's own placement is right. Tracking ends at the nearest one on each side.
-                Frames in between are then yielded again, blended with tracking back from the anchor.
+            start: The frame where tracking starts.
+            frames: All frames that may be tracked, including `start`.
+            motion: What changes: "location", "rotation" (and location), or "scale" (and both).
+            anchors: Frames where the subject's own placement is right, such as the user's keyframes. In each direction,
+                tracking ends at the nearest one. Frames up to there are then yielded again, blended with tracking back
+                from the anchor.
 
         Raises:
             TrackingError: Nothing can be tracked.
@@ -353,7 +360,7 @@ class Track(ABC):
 
     @abstractmethod
     def _tracker(self, start: int) -> tuple[Pursuit, float]:
-        """Return what follows the subject shown at the frame `start`, and how sure it is to be the subject, 0 to 1.
+        """Return a tracker of the subject as shown at `start`, and a factor 0 to 1 for all its confidences.
 
         Raises:
             TrackingError: There is nothing to follow.
@@ -429,12 +436,12 @@ class Track(ABC):
         return motions.unwound(moved, near)
 
     def _bridged(self, last: Tracked, seen: Tracked, lost: list[int]) -> Iterator[Tracked]:
-        """Yield where the subject is (Tracked) at frames where it was not found: on a straight path in between.
+        """Yield interpolated placements, on a straight path, of frames where the subject was not found.
 
         Args:
-            last: The last frame before in which it was found.
-            seen: The next frame in which it was found.
-            lost: The frames in between.
+            last: The subject in the last frame before them.
+            seen: The subject in the first frame after them, in the direction of tracking.
+            lost: These frames.
         """
         for missing in lost:
             share = (missing - last.frame) / (seen.frame - last.frame)

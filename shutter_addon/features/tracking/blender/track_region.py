@@ -35,11 +35,11 @@ from ..tracking import Tracked
 
 
 def frames_to_track(scene: Scene, strip: Strip, direction: str, until: int = 0) -> range:
-    """Return the timeline frames to track, from the current one in a direction, up to the strip's ends or to `until`.
+    """Return the timeline frames to track, ascending: the current one, and those in a direction up to the strip's end.
 
     Args:
         direction: "FORWARD", "BACKWARD" or "BOTH".
-        until: Timeline frame; 0, or one in another direction: the end of the strip.
+        until: Timeline frame that limits the side of the current frame on which it lies. 0: no limit.
 
     Raises:
         EffectError: The current frame is outside of the strip.
@@ -59,7 +59,8 @@ def track(
 ) -> Generator[int | None, None, None]:
     """Track a region or the camera from the current frame, and key each frame.
 
-    Closing the generator early keeps the tracked frames. It ends if the region is gone.
+    At the end, keyframes that the motion does not need are removed, unless `track_all_keys` is on. Closing
+    the generator early keeps the frames tracked so far. It ends if the user deletes the region.
 
     Args:
         index: Of the region; None: the camera.
@@ -67,7 +68,7 @@ def track(
         patience: Seconds after which None is yielded while no frame is ready; None: wait.
 
     Yields:
-        Each timeline frame after it is keyed.
+        Each timeline frame after it is keyed; twice on the way to a keyframe of the user's own.
 
     Raises:
         EffectError, MediaError: It cannot be tracked. If no frame has been yielded, nothing has changed.
@@ -119,9 +120,11 @@ def track(
 
 
 def stops(effect: PropertyGroup, index: int | None) -> list[tuple[int, str, bool]]:
-    """Return where tracking stopped, ascending: timeline frame, reason for the user, and whether it is a fault.
+    """Return where tracking of a region (None: the camera) stopped, in ascending order.
 
-    A cut in the footage is no fault.
+    Returns:
+        For each stop: the first timeline frame not reached, the reason in the user's language, and whether it is a
+        fault. False: the footage has a cut there.
     """
     return sorted((frame, rpt_(stop.fault), stop.fault != tracking.SHOT_ENDS) for frame, stop in _stops(effect, index))
 
@@ -133,9 +136,10 @@ def _stops(effect: PropertyGroup, index: int | None) -> list[tuple[int, Property
 
 
 def key_ends(effect: PropertyGroup, index: int | None) -> None:
-    """Insert keyframes that fade out a region or the camera's influence where tracking ends, in place of older ones.
+    """Insert opacity keyframes that fade out a region where tracking stopped (index None: the camera's influence).
 
-    A region that is a matte, such as an outline, gets none.
+    They replace those that an earlier call inserted; the user's own stay. If the option `track_ends` is off, or the
+    region is a matte, such as an outline, the earlier ones are only removed.
     """
     keys, fades = MotionKeys(effect, index, "SCALE"), []
     frames, confidence = keys.confidence()
@@ -171,9 +175,11 @@ def next_unsure(effect: PropertyGroup, index: int | None, frame: float) -> int |
 
 
 def faults(effect: PropertyGroup, index: int | None) -> list[tuple[int, str, bool]]:
-    """Return where tracking lost the subject, if it did, and where it stopped: frame, reason, whether a fault.
+    """Return what the interface lists about tracking: the result of `lost`, if any, then those of `stops`.
 
-    Frames are timeline frames. A cut in the footage is no fault.
+    Returns:
+        For each: the timeline frame, the reason in the user's language, and whether it is a fault. The subject is lost
+        where confidence stays low, although tracking may have gone on. A stop at a cut is no fault.
     """
     where = lost(effect, index)
     return [*([(*where, True)] if where else []), *stops(effect, index)]
@@ -200,11 +206,12 @@ def _subject(
     """Return the region or camera to track as plain data, and the function that tracks it.
 
     Args:
+        index: Of the region; None: the camera.
         frames: Timeline frames to track.
-        here: The frame where tracking starts, and the place there.
+        here: The frame where tracking starts, and the subject's placement there.
 
     Returns:
-        The region or camera, and a function with the arguments of tracking.Track.follow.
+        The region or camera with that placement, and a function with the arguments of tracking.Track.follow.
     """
     if index is None:
         camera = _standing(snapshot.camera_at(scene, effect, frames), here)
@@ -222,11 +229,13 @@ def _subject(
 
 
 def _standing(moving: Any, here: Tracked) -> Any:
-    """Copy a region or the camera (plain data) with the place that the user has set at one frame, keyed or not.
+    """Return a copy of a region or the camera (plain data) in which the placement at one frame is replaced.
+
+    The user may have changed it without inserting a keyframe.
 
     Args:
         moving: The region or camera.
-        here: The frame and the place.
+        here: The frame and its new placement.
     """
     sampled = {
         name: replace(channel, values=channel.values | {here.frame: getattr(here.placement, name)})
@@ -257,12 +266,14 @@ def _write(keys: MotionKeys, kept: Iterable[Tracked], tracked: Iterable[Tracked]
 def _mark(
     effect: PropertyGroup, index: int | None, tracked: dict[int, Tracked], stops: list[Tracked], reach: tuple[int, int]
 ) -> None:
-    """Store where tracking stopped, and remove older stops of the frames that it has passed or was to reach.
+    """Store where tracking stopped, and remove outdated stops of earlier tracking.
+
+    Those at tracked frames are removed and, in a direction in which it stopped now, those up to the end of `reach`.
 
     Args:
-        tracked: What was found, by frame; the first is where tracking started.
-        stops: Where and why it stopped.
-        reach: First and last frame that it was to track.
+        tracked: Results by timeline frame. The first item is the frame where tracking started.
+        stops: Where and why tracking stopped (Tracked with a fault).
+        reach: First and last timeline frame that were to be tracked.
     """
     moving, start = selection.moving(effect, index), next(iter(tracked))
     ways = {stop.frame > start for stop in stops}
@@ -279,11 +290,11 @@ SMOOTHNESS = 6  # frames before and after each: half a second
 
 
 def make_follow(effect: PropertyGroup, index: int, subject: str, key: bool) -> None:
-    """Make a shutter's exposure follow its region or the camera, fully open around the shown frame.
+    """Make a shutter's exposure move with a region or the camera, fully open and centered on the shown frame.
 
     Args:
         index: Of the shutter.
-        subject: "REGION" or "CAMERA".
+        subject: "REGION" (the one that the shutter's `follow_region` names) or "CAMERA".
         key: Insert keyframes for the shutter's bars.
 
     Raises:
@@ -296,7 +307,7 @@ def make_follow(effect: PropertyGroup, index: int, subject: str, key: bool) -> N
 
 
 def panning_shot(effect: PropertyGroup, index: int, key: bool = False) -> None:
-    """Make a region a sharp layer, and let the exposure of all else move with it, as with a panning camera.
+    """Make a region a sharp layer, and blur all else along its motion, as a camera does that pans with it.
 
     Args:
         index: Of the region.
@@ -313,9 +324,9 @@ def panning_shot(effect: PropertyGroup, index: int, key: bool = False) -> None:
 
 
 def is_tracked(scene: Scene, effect: PropertyGroup, strip: Strip, index: int | None) -> bool:
-    """Tell whether a region or the camera has keyframes of motion that reach the current frame.
+    """Tell whether keyframes say how a region or the camera moves at the current frame.
 
-    A region must also be drawn at this frame. Otherwise *Panning Shot* and *Stabilize Exposure* track it first.
+    A region must also have strokes there. If False, *Panning Shot* and *Stabilize Exposure* track it first.
 
     Args:
         index: Of the region; None: the camera.
@@ -326,10 +337,9 @@ def is_tracked(scene: Scene, effect: PropertyGroup, strip: Strip, index: int | N
 
 
 def tripod(effect: PropertyGroup, key: bool = False) -> None:
-    """Make the active shutter's exposure follow the camera, so that it looks as if the camera stood still.
+    """Make the active shutter's exposure move with the camera, so that only what moves by itself is blurred.
 
-    The shutter is fully open around the shown frame. If it has no region, and so covers nothing, the default shutter is
-    used instead.
+    The shutter is fully open, centered on the shown frame. If no region uses it, the default shutter takes its place.
 
     Args:
         key: Insert keyframes for the bars.
