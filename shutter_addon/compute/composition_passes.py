@@ -86,19 +86,24 @@ def way_of(window: Window, state: FrameState, values: np.ndarray, shortened: boo
 
 
 def moved_way(state: FrameState, values: np.ndarray, motions: int, mixed: int, quads: int) -> tuple[str, int]:
-    """Choose the shader that composes a picture whose shutters follow a motion, within llvmpipe's limit of iterations.
+    """Choose the shader that composes a picture whose shutters follow a motion.
+
+    llvmpipe limits the loop iterations of an invocation (MOST_ITERATIONS). The choice is the same on every device. "By
+    displacement" and "by value" are the two ways to interpolate shutters (Options.interpolation).
 
     Args:
         state: The effect.
-        values: The table of shutters from moved_tables, without its last `motions` rows.
-        motions: The number of motions for each frame: 1 by displacement; by value, how many different ones shutters
-            have.
-        mixed: How many motions each pixel averages: all N of the shutters by displacement, 1 by value.
-        quads: How many groups of four pixels above one another an invocation shall compose.
+        values: The table of shutters from moved_tables, without its last `motions` rows, which tell the shutters of
+            each motion.
+        motions: How many motions there are for each frame. By displacement 1; by value the number M of different
+            motions (moved_tables).
+        mixed: Of how many motions that one is the mean. By displacement the number N of shutters; by value 1.
+        quads: How many groups of pixels an invocation should compose. A group is four pixels of a column.
 
     Returns:
-        The shader's name without compose_: "value", "frames" or "search"; and how many groups of four pixels an
-        invocation composes: `quads`, or 1 if that takes too many iterations.
+        The shader's name without compose_: "value" by value; by displacement "frames", or "search" if "frames" takes
+        too many iterations. And how many groups an invocation composes: `quads`, or 1 for "search" and if `quads` take
+        too many iterations.
     """
     span = state.open_span
     frames = span[1] - span[0]

@@ -341,7 +341,12 @@ class Diffusion:
             self._run(self._pass(grid, "smooth"), grid, "near", cells, grid.layers, values=values, colour=colour)
 
     def _pass(self, grid: _Grid, name: str) -> Pass:
-        """Return the pass of `operators` with a name, for the way in which a grid's cells are coupled."""
+        """Return a pass from `operators` in the variant for a grid: `finest` for pixels, "STENCIL" for coarser grids.
+
+        Args:
+            grid: The grid.
+            name: A key of what `operators` returns, such as "smooth".
+        """
         return self.finest[name] if grid.finest else _COARSER[name]
 
     def _finish(self) -> None:

@@ -130,7 +130,12 @@ class EdgeDiffusion(Diffusion):
             self._cycle(index)
 
     def _conjugate_gradients(self, grid: _Grid, iterations: int) -> None:
-        """Improve a grid's solution by some iterations of conjugate gradients, which a cycle preconditions."""
+        """Improve a grid's solution in place by conjugate gradients. Each iteration is preconditioned by `_visit`.
+
+        Args:
+            grid: The grid whose index is `_solved`.
+            iterations: The number of iterations.
+        """
         own, more = grid.textures, self._more
         solution, right = own["solution"], own["right"]
         self._run(_MISSING, grid, "near", 64, grid.layers, values=solution, result=more["residual"], amount=1.0)

@@ -364,7 +364,15 @@ class LayerColors:
         return self._memo(frame, number, lambda: self._separate(frame, number))
 
     def _separate(self, frame: int, number: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return what `_separated` returns, not cached."""
+        """Make what `_separated` caches.
+
+        Args:
+            frame: The source frame.
+            number: The index of the layer that is the subject. −1: all layers together are.
+
+        Returns:
+            As for `_separated`: the frame (H, W, 4) with the subject's colors, and with those behind it.
+        """
         mattes = self._mattes.edges(self.layers, frame)
         matte = 1 - layering.behind(mattes) if number < 0 else mattes[number]
         picture, mixed = as_rgba(self._source.decoded(frame)), (matte > 0) & (matte < 1)

@@ -34,10 +34,20 @@ class Stages:
         self._held: dict[int, Hashable] = {}  # {layer of _mattes: key of the values in it}
 
     def solve(self, labels: np.ndarray, count: int, *guided: Any, warm: bool = False) -> Texture:
-        """Return how much of each shutter a pixel gets, spread from labels, as a texture (request.Stages.solve).
+        """Spread shutters from labels to all pixels (request.Stages.solve), with one of two solvers.
 
-        There are two solvers, with and without a guide. The one that is not used now frees its memory. `warm` counts
-        only without a guide.
+        EdgeDiffusion stops at edges of a guide, Diffusion has no guide. The solver that is not used now frees its
+        memory.
+
+        Args:
+            labels: (h, w) uint16: 0 where nothing is drawn, 1 + index of the shutter that is drawn.
+            count: The number of shutters.
+            guided: The guide and the strength, as in request.Stages.solve, or nothing. They are ignored if nothing is
+                drawn, or all pixels are drawn on: then nothing spreads.
+            warm: Whether to start from the last result (Diffusion.solve). It has no effect with a guide.
+
+        Returns:
+            How much of each shutter a pixel gets: a texture array, as from Diffusion.solve.
         """
         if guided and 0 < np.count_nonzero(labels) < labels.size:  # else nothing is diffused
             self._plain.release()

@@ -176,8 +176,8 @@ class Frames(Window):
 
     Samples are stored as they are, except for sRGB floats, which are converted to linear light.
 
-    If the device has no room for the whole window, the frames stay on the host, and every picture sends them part by
-    part. Pictures have the same bits in both cases.
+    If the device has no room for the whole window, the frames stay on the host. Every picture then sends them to the
+    device one after another of Window.parts (here bands of rows). Pictures have the same bits in both cases.
     """
 
     def __init__(self, device: Device, source: FrameSource, capacity: int, shutters: int = 1) -> None:

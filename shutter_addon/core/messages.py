@@ -12,7 +12,10 @@ LONGEST = 300  # characters
 
 
 class UserError(Exception):
-    """An error that a user can fix. Its message is one printable sentence that begins with the place of the error."""
+    """An error that a user can fix. Its message is one printable line of at most LONGEST characters.
+
+    If the error has a place, such as a file or a region, the message begins with it.
+    """
 
     def __init__(self, *arguments: object) -> None:
         super().__init__(*arguments)

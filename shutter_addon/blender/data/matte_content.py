@@ -253,7 +253,12 @@ def parts_for(region: PropertyGroup, effect_strip: Strip) -> list:
 
 
 def part_at(parts: list, frame: float) -> Strip:
-    """Return the strip that lies at a timeline frame, the first listed of several; if there is none, the nearest."""
+    """Return the strip that shows a timeline frame; if none does, the one nearest in time.
+
+    Args:
+        parts: The strips, at least one. Of several that qualify, the first one counts.
+        frame: The timeline frame. A strip shows the frames from its left handle to the one before its right handle.
+    """
     return min(parts, key=lambda part: max(part.left_handle - frame, frame - part.right_handle + 1, 0))
 
 

@@ -59,8 +59,8 @@ def _property(field: Field, **more: Any) -> object:
 
     Args:
         field: Describes the field.
-        more: Further arguments of the Blender property. `update` replaces `changed`, which all but texts have by
-            default.
+        more: Further arguments of the Blender property, which replace those made from the field. Without an `update`,
+            a change calls consistency.changed; but a change of a text calls nothing.
     """
     kind, default = type(field.default), field.default
     said: dict = {"name": field.label, "description": field.description, "translation_context": field.context}

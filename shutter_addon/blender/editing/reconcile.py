@@ -452,11 +452,12 @@ def _follow_mixing(strip: Strip, source: Strip, *, is_encoded: bool) -> None:
 
 @lru_cache(256)
 def _header(spec: source_media.SourceSpec) -> tuple[tuple[int, int], bool] | None:
-    """Open footage once, and return what effect scenes need to know of it; None: it cannot be read.
+    """Open footage, and return what effect scenes need to know of it. The result is cached.
 
     Returns:
-        (width, height) in pixels, limited to what a Blender scene can have; and whether Blender, where it scales or
-        turns the footage, blends display values (movies, 8-bit pictures) instead of light.
+        (width, height) in pixels, each limited to what a Blender scene can have; and whether Blender, where it scales
+        or turns the footage, blends display values (movies, 8-bit pictures) instead of light. None: the footage cannot
+        be read.
     """
     with suppress(MediaError):
         medium = open_source(spec.path, files=spec.files, **spec.options | {"colorspace": None})

@@ -195,13 +195,13 @@ class Quad:
         self._high = 1 - np.array([crop.max_x / width, crop.max_y / height])
 
     def draw(self, name: str, textures: dict, left: float = 0.0, right: float = 1.0, **constants) -> None:
-        """Draw a picture, or a part of its width, with a pass of shaders/show.glsl. Cropped parts are left out.
+        """Draw a picture, or a part of its width, with a pass of shaders/show.glsl. What the strip crops is left out.
 
         Args:
             name: Name of the pass.
             textures: The textures that the pass reads, by sampler name.
-            left: Left edge of the drawn part, as a fraction of the picture's width.
-            right: Right edge of the drawn part, as a fraction of the picture's width.
+            left: Left edge of the drawn part, as a fraction of the uncropped picture's width.
+            right: Right edge of the drawn part, as a fraction of the uncropped picture's width.
             constants: Values of the pass's constants, by name, such as its opacity.
         """
         low, high = np.maximum(self._low, (left, 0)), np.minimum(self._high, (right, 1))

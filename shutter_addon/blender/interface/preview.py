@@ -129,11 +129,16 @@ def _draw() -> None:
 
 
 def _show(context: Context, shown: Shown, decision: Decision | None, say: Say) -> None:
-    """Draw the effect over its preview, or add a note about why that is impossible.
+    """Draw what the live preview shows of an effect: the picture or view, strokes and notes.
+
+    If making the picture takes long, draw the strokes and the note "Composing…", and go on in the next redraw. An error
+    of the effect becomes a note.
 
     Args:
+        context: The context of the preview.
         shown: The effect strip that the preview shows.
-        decision: What previews.for_engine decided in this redraw; None: Blender has not asked the engine for a picture.
+        decision: What previews.for_engine decided in this redraw, when Blender asked the extension's render engine for
+            the picture. None: Blender did not ask it; the decision is made here.
         say: Adds a note.
     """
     try:

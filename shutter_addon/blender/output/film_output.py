@@ -46,7 +46,7 @@ class OutputError(UserError, ValueError):
 
 
 class InterruptedRenderError(OutputError):
-    """The user or a render farm stopped the render. The message says what is finished."""
+    """The user or a render farm stopped the render. The message names the output, and what is kept of a movie."""
 
 
 def is_movie(path: Path) -> bool:

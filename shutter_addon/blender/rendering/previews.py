@@ -339,7 +339,10 @@ def refine() -> None:
 
 
 def show_carried() -> None:
-    """Close the renderers of previews and draw previews again, after mattes of outlines were tracked."""
+    """Have previews show new mattes of tracked outlines and subjects ("carried" from frame to frame).
+
+    Close the renderers of previews, which hold older mattes, and draw previews again.
+    """
     sessions.SESSIONS.window.keep(set())
     strips.invalidate_all()
     preview_areas.redraw()

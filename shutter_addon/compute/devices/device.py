@@ -269,7 +269,11 @@ class Device:
         self._windows[release] = None
 
     def forget(self, release: Callable[[], None]) -> None:
-        """Stop keeping track of a window that was freed. `release`: the function that was given to `use`."""
+        """Stop keeping track of a window. This does not free it. An unknown window is ignored.
+
+        Args:
+            release: The function that was given to `use` for this window. It is not called.
+        """
         self._windows.pop(release, None)
 
     def release(self) -> None:

@@ -336,7 +336,7 @@ class SourceFile(Hashable, Protocol):
     """
 
     def open(self) -> FrameSource:
-        """Open the source.
+        """Open the source. The caller has to close it.
 
         Raises:
             MediaError: It cannot be read.

@@ -197,17 +197,20 @@ class Following:
 class Layers:
     """The n visible layers: regions that are exposed by themselves in front of the rest (core/pixels/layering.py).
 
-    They are in order, the farthest first. A drawn layer (effect.Region) consists of strokes, any other has a matte.
+    They are in order, the farthest first. A drawn layer (effect.Region) has strokes, from which its matte is diffused.
+    Any other layer has a matte of its own.
 
     Attributes:
         shutters: For each layer the index of its shutter.
         opacities: For each layer its opacity, above 0, at most 1.
-        first: The number of the first source frame for which mattes are known.
-        scribbles: For each source frame from `first` on, a state from whose scribbles the mattes of the drawn layers
-            are diffused: its shutter 1 + i stands for layer i, its shutter 0 for what belongs to no layer. None if
-            there are no drawn layers, and for computed frames that the window cannot show, which need no mattes.
+        first: The source frame to which the first items of `scribbles` and `mattes` belong.
+        scribbles: For each source frame from `first` on, a state with the strokes of that frame. Diffusing it gives the
+            mattes of the drawn layers. In it, shutter 1 + i stands for layer i, and shutter 0 for what belongs to no
+            layer. None: there are no drawn layers, or the frame lies outside the window and is computed (Smooth). Only
+            filmed frames are used outside the window, to find the background.
         mattes: For each source frame from `first` on, a tuple with the matte of each layer, or None for a drawn layer.
-        camera: The camera's motion, as a Following with one column; None if it is unknown or still.
+        camera: The camera's motion between source frames, as a Following whose only column is the camera. None: it is
+            unknown or still.
     """
 
     shutters: tuple[int, ...]

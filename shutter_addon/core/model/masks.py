@@ -243,15 +243,19 @@ def _widths(spline: MaskSpline, weights: np.ndarray, segment: np.ndarray, u: np.
 
 
 def _pixel_wide(edge: np.ndarray, feather: np.ndarray, pixel: float) -> np.ndarray:
-    """Return the feather's outer edge (n, 2) with a distance of at least a pixel from the spline's polygon.
+    """Make a feather at least a pixel wide.
 
-    A point that is nearer is replaced by the polygon's point with the same index, moved by `pixel` to the feather's
-    side. Its direction is the normal at the previous point of the polygon, as in Blender.
+    A point of the feather that is nearer than `pixel` to its point of the spline is replaced: by that point, moved by
+    `pixel` to the left of the spline's direction, where feathers lie. As in Blender, it is moved along the normal at
+    the point before.
 
     Args:
-        edge: The spline's polygon (n, 2), in fractions of the picture.
+        edge: The spline's polygon (n, 2), in fractions of the picture, y up.
         feather: The feather's outer edge (n, 2), a point for each point of `edge`.
-        pixel: The least distance, in fractions of the picture.
+        pixel: The least distance, in fractions of the picture. It is the same fraction in both directions.
+
+    Returns:
+        The new outer edge, (n, 2).
     """
     steps = _normalized(np.roll(edge, 1, axis=0) - edge)
     along = _normalized(np.roll(steps, 1, axis=0) + steps)

@@ -165,14 +165,17 @@ def weights(start: np.ndarray, end: np.ndarray, dz: np.ndarray, window: int) -> 
 
 
 def displace(shutters: ArrayLike, coefficients: ArrayLike) -> np.ndarray:
-    """Interpolate N shutters by displacement: their light moves in time instead of fading (paper §3.2, §3.4.1; exact).
+    """Interpolate N shutters by displacement: their light moves in time instead of fading (paper §3.2, §3.4.1).
+
+    The quantile S⁻¹ of the result is the weighted mean of the shutters' quantiles (see the module).
 
     Args:
         shutters: Bars (N, L).
-        coefficients: (…, N), Σc = 1, c ≥ 0.
+        coefficients: How much of each shutter to take, (…, N), ≥ 0, with the sum 1.
 
     Returns:
-        Bars (…, L), whose sum is the exposure of the interpolated shutter, e(q) = Σ cᵢ eᵢ.
+        Bars (…, L) of the interpolated shutter. Their sum is its exposure: the weighted mean Σ cᵢ eᵢ of the shutters'
+        exposures.
     """
     shutters = np.atleast_2d(np.asarray(shutters, dtype=np.float64))
     coefficients = np.asarray(coefficients, dtype=np.float64)

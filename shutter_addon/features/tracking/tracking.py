@@ -436,7 +436,9 @@ class Track(ABC):
         return motions.unwound(moved, near)
 
     def _bridged(self, last: Tracked, seen: Tracked, lost: list[int]) -> Iterator[Tracked]:
-        """Yield interpolated placements, on a straight path, of frames where the subject was not found.
+        """Yield guessed placements of frames where the subject was not found, with the confidence 0.
+
+        Location, rotation and scale are interpolated linearly in time. The subject's middle moves on a straight line.
 
         Args:
             last: The subject in the last frame before them.

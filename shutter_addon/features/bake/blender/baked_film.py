@@ -151,8 +151,8 @@ def render(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film, report
         effect: The effect of the strip.
         strip: The effect strip.
         film: What to render (`film_of`).
-        report: Called after each frame, also after one that was finished before, unless the whole movie was. It may
-            raise an exception to stop.
+        report: Called once for each frame, also for frames that an earlier run finished. Not called if the whole movie
+            is there already. It may raise an exception to stop.
 
     Raises:
         effect_source.FAULTS, OutputError, OSError: The film cannot be made.

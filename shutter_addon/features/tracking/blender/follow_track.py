@@ -53,7 +53,15 @@ def follow(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> Non
 
 
 def holder_of(region: PropertyGroup) -> MovieTrackingObject | None:
-    """Return the tracking object of a region's clip whose tracks can be chosen; None: the clip has no such object."""
+    """Return the tracking object whose tracks a region can follow.
+
+    Args:
+        region: The region. It must have a clip.
+
+    Returns:
+        The object of the clip that is named in `follow_object`; if no name is given, the clip's first one, which is the
+        camera. None: the clip has no object of this name.
+    """
     objects = region.follow_clip.tracking.objects
     return objects.get(region.follow_object) if region.follow_object else objects[0]
 
