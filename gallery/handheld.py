@@ -28,7 +28,7 @@ SPEED = 0.16  # of the cars, in metres a frame
 
 
 def footage(folder: Path) -> Path:
-    """Half-float EXR, so that lamps leave bright trails. The camera shakes: it turns about its centre, and a long lens
+    """Half-float EXR, so that lamps leave bright trails. The camera shakes: it turns about its center, and a long lens
     makes that a shift and a turn of the picture."""
     return _render(folder, _shake)
 

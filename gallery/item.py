@@ -83,7 +83,7 @@ class Shot:
         return np.clip(light.to_encoded(picture[..., :3]), 0, 1)
 
     def scribbles(self, frame: int, dim: float = 0.6) -> np.ndarray:
-        """The scribbles in their shutters' colours, a little transparent, over the darkened footage."""
+        """The scribbles in their shutters' colors, a little transparent, over the darkened footage."""
         picture = self.source(frame) * np.float32(dim)
         height, width = picture.shape[:2]
         border = self.contents.options.at(1).border
@@ -92,13 +92,13 @@ class Shot:
         return picture
 
     def coefficients(self, frame: int) -> np.ndarray:
-        """How much of each shutter a pixel gets, in the shutters' colours."""
+        """How much of each shutter a pixel gets, in the shutters' colors."""
         request = Request(*state_at(self.effect, Clip.of(self._source), frame))
         values = self._renderer.coefficients_with_layers(request)
         return np.tensordot(values, self._colors, axes=(0, 0))
 
     def bars(self, frame: int, shutter: str) -> tuple[np.ndarray, np.ndarray]:
-        """A shutter's bars (L,) at a frame, and its colour (3,)."""
+        """A shutter's bars (L,) at a frame, and its color (3,)."""
         index = self._index(shutter)
         return self.effect.at(frame).bars[index], self._colors[index]
 

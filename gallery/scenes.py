@@ -1,6 +1,6 @@
 """Rendered footage: scenes built from nothing in Blender's units, and their frames on disk. Needs bpy.
 
-Colours are written as `#rrggbb` of sRGB. Frames count from 1.
+Colors are written as `#rrggbb` of sRGB. Frames count from 1.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ SIZE = 960, 540
 def begin(sky: str, strength: float = 1.0, samples: int = 4, motion_blur: float = 0.0):
     """Gives an empty scene for Cycles, evenly lit by the sky.
 
-    sky: its colour
+    sky: its color
     motion_blur: how much of a frame's time the footage's own shutter is open, 0 to 1, from the frame on
     """
     bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -36,7 +36,7 @@ def begin(sky: str, strength: float = 1.0, samples: int = 4, motion_blur: float 
     render.motion_blur_position = "START"
     cycles.samples, cycles.use_adaptive_sampling = samples, False
     cycles.max_bounces = 2
-    # The colours alone guide the denoiser: albedo and normals would double a frame's time.
+    # The colors alone guide the denoiser: albedo and normals would double a frame's time.
     cycles.use_denoising, cycles.denoising_quality, cycles.denoising_input_passes = True, "FAST", "RGB"
     scene.view_settings.view_transform = "Standard"
     scene.world = bpy.data.worlds.new("Sky")
@@ -114,7 +114,7 @@ def shade(owner, node: str, **inputs) -> None:
 
 
 def paint(color: str, roughness: float = 0.6, metallic: float = 0.0):
-    """A material with a colour."""
+    """A material with a color."""
     material = bpy.data.materials.new(color)
     shade(material, "BsdfPrincipled", Base_Color=linear(color), Roughness=roughness, Metallic=metallic)
     return material

@@ -63,7 +63,7 @@ def lettering(words: str, width: int, size: int = TEXT, color=INK) -> np.ndarray
 
 
 def graph(bars, color, width: int, height: int, words: str = "", size: int = 24) -> np.ndarray:
-    """A shutter's bars (L,) as a bar graph in its colour, the highest one fills it; words stand above the bars."""
+    """A shutter's bars (L,) as a bar graph in its color, the highest one fills it; words stand above the bars."""
     bars = np.asarray(bars) / np.max(bars)
     picture = _plain(height, width, GROUND)
     room = height - 14 - (round(1.3 * size) if words else 0)

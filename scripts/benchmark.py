@@ -108,7 +108,7 @@ def shapes(count: int) -> tuple[scribbles.Shape, ...]:
 
 
 def reference(state: FrameState, codes: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
-    """The linear colours (P, 3) float64 of pixels: core.pixels.compositor's, a few at a time, for their weights are
+    """The linear colors (P, 3) float64 of pixels: core.pixels.compositor's, a few at a time, for their weights are
     large.
 
     codes: (L, P, 4) uint8 of the window's frames; coefficients: (N, P)"""
@@ -120,13 +120,13 @@ def reference(state: FrameState, codes: np.ndarray, coefficients: np.ndarray) ->
 
 
 def levels_apart(picture: np.ndarray, expected: np.ndarray) -> float:
-    """The largest difference of linear colours, in 8-bit levels."""
+    """The largest difference of linear colors, in 8-bit levels."""
     return float(np.abs(light.to_encoded(picture) - light.to_encoded(expected)).max() * 255)
 
 
 @cache
 def edged(height: int, width: int) -> np.ndarray:
-    """A guide (h, w, 3) float32 of so many pixels, on cells as large as compute.guide would make them: random colours
+    """A guide (h, w, 3) float32 of so many pixels, on cells as large as compute.guide would make them: random colors
     16 rows of a 240th apart, and what is linear between them."""
     cell = guide.cell_of(min(height, width))
     height, width = -(-height // cell), -(-width // cell)
@@ -156,7 +156,7 @@ def combining(state: FrameState, mode: str) -> FrameState:
 
 
 def combined_reference(state: FrameState, mode: str, codes: np.ndarray, c: np.ndarray) -> np.ndarray:
-    """float64 colours (P, 3) of pixels with coefficients c (N, P), whose samples in the frames are codes (L, P, 4)."""
+    """float64 colors (P, 3) of pixels with coefficients c (N, P), whose samples in the frames are codes (L, P, 4)."""
     encoded = state.options.light == "encoded"
     lights = codes / 255.0 if encoded else light.premultiplied(codes / 255.0, light.to_linear)
     c = np.maximum(c, 0).astype(np.float64)
@@ -227,7 +227,7 @@ class LayerCase:
         return self._laying.lay(Behind(exposures[0]), exposures[1:], False)
 
     def expected(self, frames, y, x, coefficients: np.ndarray) -> np.ndarray:
-        """float64 colours (P, 3) of pixels; frames: the source's in the window; coefficients: (N, P)."""
+        """float64 colors (P, 3) of pixels; frames: the source's in the window; coefficients: (N, P)."""
         colors = [light.premultiplied(self._source.read(int(k))[y, x] / 255.0, light.to_linear)[None] for k in frames]
         mattes_ = np.stack([self.matte(int(k))[y, x].astype(np.float64)[None] for k in frames])[None]
         layers = Layers(shutters=(1,), opacities=(1.0,), first=0, scribbles=(), mattes=())
@@ -403,7 +403,7 @@ class Case:
         return levels_apart(picture, expected)
 
     def _reference(self, y, x, method: str) -> np.ndarray:
-        """float64 colours (P, 3) of pixels."""
+        """float64 colors (P, 3) of pixels."""
         codes = np.stack([self.source.read(k)[y, x] for k in self._wanted])
         if method == "average":
             encoded = self.state.options.light == "encoded"
@@ -418,7 +418,7 @@ class Case:
         return self.compositor.coefficients(self.handle, len(self.state.bars))[:, y // block, x // block]
 
     def _followed(self, y, x) -> np.ndarray:
-        """float64 colours (P, 3) of pixels of what follows."""
+        """float64 colors (P, 3) of pixels of what follows."""
         c = self._coefficients(y, x).astype(np.float64)
         weights = compositor.mixed_shutter(self.state, np.moveaxis(c, 0, -1))
         weights /= weights.sum(axis=-1, keepdims=True)

@@ -29,7 +29,7 @@ from shutter_addon.media import open_source  # noqa: E402
 
 def similarity(picture: np.ndarray, other: np.ndarray, where: np.ndarray | None = None) -> float:
     """Return the structural similarity (Wang et al. 2004, Gaussian weights) of two 8-bit pictures (H, W, 3): the mean
-    over their colours, 1 for equal ones. where: (H, W) bool, the mean over these pixels alone."""
+    over their colors, 1 for equal ones. where: (H, W) bool, the mean over these pixels alone."""
     how = {"gaussian_weights": True, "sigma": 1.5, "use_sample_covariance": False}
     mean, each = structural_similarity(picture, other, channel_axis=2, data_range=255, full=True, **how)
     return float(mean if where is None else each[where].mean())

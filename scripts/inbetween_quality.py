@@ -5,7 +5,7 @@
 
 films: every second frame is dropped and rebuilt. scenes: of gallery footage at 240 fps, every eighth frame is kept; and
     a box shutter over four kept frames is compared with the same over all 32.
-Ways: "flow" is shutter_addon.media.flow's, "blend" mixes both neighbours in linear light, "repeat" shows the earlier
+Ways: "flow" is shutter_addon.media.flow's, "blend" mixes both neighbors in linear light, "repeat" shows the earlier
 one, "minterpolate" is `ffmpeg -vf minterpolate=mi_mode=mci` from PATH. Rendering needs Blender as a library (bpy).
 """
 

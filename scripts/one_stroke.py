@@ -184,7 +184,7 @@ class Masks:
         return self._keyed[keys].for_picture(self._source.width / self._source.height).at(frame)
 
     def picture(self) -> np.ndarray:
-        """A row of each way at four moments: what it takes in colours, the true outline in white."""
+        """A row of each way at four moments: what it takes in colors, the true outline in white."""
         rows = [[(self._shown(frame), f"Frame {frame}") for frame in SHOWN]]
         rows += [[(self._outlined(way, frame), way) for frame in SHOWN] for way in WAYS]
         panels = [stills.row(*(stills.Panel(picture, words) for picture, words in row)) for row in rows]

@@ -36,7 +36,7 @@ def still(_frame: float) -> tuple[float, float, float]:
 class Scene:
     """board: x, y, turn in radians and scale at a frame; camera: x, y and zoom; cover: x of a bar over the board.
 
-    ground, paint: colours; blur: how much of a frame's time the shutter is open; masked: whether masks are rendered."""
+    ground, paint: colors; blur: how much of a frame's time the shutter is open; masked: whether masks are rendered."""
 
     name: str
     board: Callable[[float], tuple[float, float, float, float]]
@@ -105,7 +105,7 @@ def _is_board(thing) -> bool:
 
 
 def place(scene: Scene, frame: float, size) -> tuple[float, float, float, float]:
-    """Where the board's centre lies in the picture: x, y in fractions, y up; its turn in radians; and its scale, with
+    """Where the board's center lies in the picture: x, y in fractions, y up; its turn in radians; and its scale, with
     which a unit is 1/16 of the width where it is 1."""
     frame += scene.blur / 2  # in the middle of the exposure
     (x, y, turn, scale), (left, up, zoom) = scene.board(frame), scene.camera(frame)
@@ -206,7 +206,7 @@ def _straighten(thing) -> None:
 
 
 def _mottled(first: str, second: str, amount: float, size: int = 512):
-    """A glowing material between two colours, by noise; amount: of finer noise, as a share of the brightness; size: of
+    """A glowing material between two colors, by noise; amount: of finer noise, as a share of the brightness; size: of
     its image, in pixels."""
     material = scenes.glow(first, 1.0)
     rng = np.random.default_rng(len(first) + int(first[1:], 16))
@@ -227,7 +227,7 @@ def _noise(rng, size: int, wave: float) -> np.ndarray:
 
 
 def _textured(tree, colors: np.ndarray, shader: str) -> None:
-    """Gives a shader node the scene-linear colours (height, width, 3), stretched over the mesh."""
+    """Gives a shader node the scene-linear colors (height, width, 3), stretched over the mesh."""
     image = bpy.data.images.new("Texture", *colors.shape[1::-1], float_buffer=True)
     pixels = np.concatenate([colors, np.ones_like(colors[..., :1])], axis=-1)
     image.pixels.foreach_set(pixels.astype(np.float32).ravel())

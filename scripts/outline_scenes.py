@@ -54,7 +54,7 @@ SCENES = (
     Scene("occluded", posts=True),
 )
 
-# Two colours of linear light, between which a sheet is mottled.
+# Two colors of linear light, between which a sheet is mottled.
 COLORS = {
     "ground": ((0.16, 0.20, 0.13), (0.34, 0.33, 0.24)),
     "skin": ((0.45, 0.27, 0.19), (0.55, 0.36, 0.26)),
@@ -80,7 +80,7 @@ def frames(scene: Scene) -> Iterator[tuple[np.ndarray, np.ndarray]]:
 
 
 def _texture(seed: int, colors) -> np.ndarray:
-    """A mottled sheet (h, w, 3) of linear light between two colours, twice as large as the picture."""
+    """A mottled sheet (h, w, 3) of linear light between two colors, twice as large as the picture."""
     random, size = np.random.default_rng(seed), (HEIGHT * FINE, 2 * WIDTH * FINE)
     mottled = sum(
         weight * cv2.resize(random.random((size[0] // step + 2, size[1] // step + 2), np.float32), size[::-1])

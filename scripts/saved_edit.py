@@ -93,7 +93,7 @@ def _carried() -> dict:
 
 
 def write_footage(folder: Path) -> None:
-    """A disc and a bright bar that walk over a ground of soft colours, 12 frames; five that are transparent in part;
+    """A disc and a bright bar that walk over a ground of soft colors, 12 frames; five that are transparent in part;
     and a matte."""
     y, x = np.indices((HEIGHT, WIDTH))
     frames = np.empty((COUNT, HEIGHT, WIDTH, 4), np.uint8)

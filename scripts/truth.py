@@ -61,7 +61,7 @@ def stage(width: int, height: int) -> bpy.types.Scene:
 
 
 def place(scene, name: str, faces, colours, x="0", y="0", z="0", turn="0") -> None:
-    """Adds flat faces, checked in two colours; place and turn (radians) are expressions of the frame."""
+    """Adds flat faces, checked in two colors; place and turn (radians) are expressions of the frame."""
     mesh = bpy.data.meshes.new(name)
     ends = np.cumsum([len(face) for face in faces])
     indices = [range(end - len(face), end) for end, face in zip(ends, faces, strict=True)]
@@ -76,7 +76,7 @@ def place(scene, name: str, faces, colours, x="0", y="0", z="0", turn="0") -> No
 
 
 def emission(name: str, colours) -> bpy.types.Material:
-    """Light in a checker of two colours, scene-linear."""
+    """Light in a checker of two colors, scene-linear."""
     material = bpy.data.materials.new(name)
     tree = material.node_tree
     tree.nodes.clear()

@@ -125,5 +125,5 @@ def test_a_contact_sheet_of_two_frames(tmp_path):
         source, scribbles, coefficients, result = (part[:, :380] for part in np.split(row, 4, axis=1))
         np.testing.assert_allclose(result.mean(axis=(0, 1)), source.mean(axis=(0, 1)), atol=0.01)
         assert np.abs(scribbles - source).mean() > 0.1
-        np.testing.assert_allclose(coefficients[100, 10], (0.2, 0.5, 1.0), atol=0.02)  # the long shutter's colour
+        np.testing.assert_allclose(coefficients[100, 10], (0.2, 0.5, 1.0), atol=0.02)  # the long shutter's color
         assert np.ptp(coefficients, axis=(0, 1)).max() > 0.5, "the face has another shutter"

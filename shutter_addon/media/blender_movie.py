@@ -76,7 +76,7 @@ class BlenderMovie(FrameSource):
             raise MediaError(f"{self.path.name}: its length is unknown; put it into an MP4 or MKV file first")
         self.fps = frame_rate(about["fps"])
         self.dtype = np.dtype(np.uint16 if about["deep"] else np.uint8)
-        # Blender takes 8-bit colours for straight, but those of deeper movies, its floats, for premultiplied.
+        # Blender takes 8-bit colors for straight, but those of deeper movies, its floats, for premultiplied.
         self.alpha = "opaque" if not about["alpha"] else "premultiplied" if about["deep"] else "straight"
 
     def read(self, index: int) -> np.ndarray:

@@ -1,6 +1,6 @@
 """Find outlines: trace the curves around a matte, and propose the outline of a subject from a stroke or a lasso.
 
-Proposals use GrabCut (Rother et al. 2004), which separates the colours of the subject from those around it along edges.
+Proposals use GrabCut (Rother et al. 2004), which separates the colors of the subject from those around it along edges.
 """
 
 import numpy as np

@@ -36,7 +36,7 @@ def moments(frames, steps):
 
 def spread(bars, steps):
     """The weights (L * steps,) of the moments of bars (L,), by the intervals that a moment stands for: each bar's light
-    lies evenly on the half intervals towards its open neighbours."""
+    lies evenly on the half intervals towards its open neighbors."""
     weights = np.zeros(len(bars) * steps)
     for place, weight in enumerate(bars):
         sides = [side for side in (-1, 1) if 0 <= place + side < len(bars) and weight > 0 < bars[place + side]]

@@ -76,7 +76,7 @@ def test_an_exr_has_the_bits_of_the_effect(bpy, film, tmp_path, channels):
     assert (baked.left_handle, baked.right_handle) == (strip.left_handle, strip.right_handle)
     written = [read_picture(Path(bpy.path.abspath(baked.directory)) / element.filename) for element in baked.elements]
     assert (np.array(written) == np.array(composed)[..., :channels]).all()
-    # Of the effect's picture Blender's way through the sequencer's colours leaves less.
+    # Of the effect's picture Blender's way through the sequencer's colors leaves less.
     assert np.abs(rendered(bpy, scene, tmp_path / "baked", whole) - before).max() < 1e-4
 
 

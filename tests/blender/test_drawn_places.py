@@ -143,7 +143,7 @@ def test_outlines_stay_as_they_are_drawn(bpy, region):
 def test_a_picture_point_lies_where_blender_draws_it(bpy, edit, render, tmp_path):
     """annotations.picture_to_image against a bright pixel block in a rendered, transformed strip."""
     picture = np.zeros((1, 40, 60, 3), dtype=np.uint8)
-    picture[0, 10:14, 40:44] = 255  # centre: 42/60 across, 12/40 from the top
+    picture[0, 10:14, 40:44] = 255  # center: 42/60 across, 12/40 from the top
     strip = edit.sequence_editor.strips.new_image("image", str(write_frames(tmp_path / "in", picture)), 1, 1)
     edit.render.resolution_x, edit.render.resolution_y = 100, 80
     t = strip.transform

@@ -283,7 +283,7 @@ def test_the_edit_is_put_back(bpy, edit, made, tmp_path, how):
 
 
 def test_a_file_that_is_gone_leaves_the_film_to_the_engine(bpy, edit, made, compared, tmp_path):
-    """Blender would show it as a picture of one colour. What a killed render has left is removed, too."""
+    """Blender would show it as a picture of one color. What a killed render has left is removed, too."""
     made()
     left = tmp_path / "temporary" / f".part-{0:016x}"
     left.mkdir()

@@ -100,7 +100,7 @@ def test_an_added_shutter_is_open_has_a_name_and_a_color_and_is_active(effect):
     assert effect.active_shutter == 3
     assert consistency.bars(effect.shutters[3]).tolist() == [1] * 8
     assert len({tuple(shutter.color) for shutter in effect.shutters}) == 4
-    for _ in shutter_edits.COLORS:  # there are more shutters than colours
+    for _ in shutter_edits.COLORS:  # there are more shutters than colors
         shutter_edits.add_shutter(effect)
     assert len({shutter.name for shutter in effect.shutters}) == 4 + len(shutter_edits.COLORS)
 

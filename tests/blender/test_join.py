@@ -16,7 +16,7 @@ FRAMES = 8
 
 @pytest.fixture(scope="module")
 def saved(bpy, tmp_path_factory):
-    """Builds an edit of noise and a tone once, under a view that changes colours, saves it with a lossless movie as
+    """Builds an edit of noise and a tone once, under a view that changes colors, saves it with a lossless movie as
     its output, and renders it: to that movie, and to folders of frames. A folder with all of these."""
     folder = tmp_path_factory.mktemp("saved")
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)

@@ -320,7 +320,7 @@ def test_another_rate_of_the_edit(bpy, edit, made, shown):
 
 
 def test_another_size_of_the_edit(bpy, edit, made, shown):
-    """Blender scales no strip: picture and scribbles stay about the image's centre."""
+    """Blender scales no strip: picture and scribbles stay about the image's center."""
     strip, _source = made(SCRIBBLED)
     effect = edit.virtual_shutter.effects[0]
     before, drawn = shown(strip, [5])[5], strokes(effect)

@@ -63,7 +63,7 @@ def expected(share, side):
 @pytest.mark.parametrize("backward", [False, True])
 @pytest.mark.parametrize(("side", "share"), [("TOP", 0.03), ("BOTTOM", 0.25), ("LEFT", 0.431), ("RIGHT", 1.0)])
 def test_each_row_is_shown_when_the_middle_one_was_filmed(bpy, edit, edited, share, side, backward):
-    """Exactly evenly from edge to edge, each of two neighbouring moments."""
+    """Exactly evenly from edge to edge, each of two neighboring moments."""
     strip, effect = edited()
     edit.sequence_editor.strips["images"].use_reverse_frames = backward
     assert call(bpy, side=side, readout=100 * share) == {"FINISHED"}

@@ -1,4 +1,4 @@
-"""Colours of a still effect are those of its source in the colour spaces that Blender's sequencer has."""
+"""Colors of a still effect are those of its source in the color spaces that Blender's sequencer has."""
 
 import numpy as np
 from support import effect_of, recipe, write_frames
@@ -6,7 +6,7 @@ from support import effect_of, recipe, write_frames
 from shutter_addon.blender.rendering import render_job
 
 LEVELS = 1
-# Where Blender changes colours of a strip that it lays over others.
+# Where Blender changes colors of a strip that it lays over others.
 LOSSY = {
     *("ACES 1.3 sRGB", "ACES 2.0 sRGB", "ADX10", "ADX16"),
     *("AgX Base sRGB", "AgX Log", "Khronos PBR Neutral sRGB"),
@@ -27,7 +27,7 @@ def apart(edit, render, strip) -> float:
 
 def test_an_effect_that_is_added_keeps_all_colours(edit, render, tmp_path, capfd, monkeypatch):
     """And an editor who lays it over others is told where these change some; a few of the spaces that do not."""
-    # A picture of all colours in steps of 17 levels.
+    # A picture of all colors in steps of 17 levels.
     cube = np.stack(np.meshgrid(*[np.arange(0, 256, 17, dtype=np.uint8)] * 3), axis=-1).reshape(1, 64, 64, 3)
     first = write_frames(tmp_path / "in", cube)
     edit.render.resolution_x = edit.render.resolution_y = 64

@@ -1,4 +1,4 @@
-"""New shutters have colours that colour-blind eyes tell apart."""
+"""New shutters have colors that color-blind eyes tell apart."""
 
 import numpy as np
 import pytest

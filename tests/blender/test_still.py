@@ -81,7 +81,7 @@ IMAGES = {
 
 @pytest.mark.parametrize("kind", IMAGES)
 def test_images(edit, render, tmp_path, kind, same_pixels):
-    """Every format, with Blender's own idea of its colour space and alpha; two steps of the window each way."""
+    """Every format, with Blender's own idea of its color space and alpha; two steps of the window each way."""
     name, samples, channels = IMAGES[kind]
     rng = np.random.default_rng(0)
     for i in (1, 2, 3):
@@ -97,7 +97,7 @@ def test_images(edit, render, tmp_path, kind, same_pixels):
     effect_of(edit, source, recipe(2, [1, 0]))
     shown = render(edit, [3, 1, 2], "16")
     for frame in (1, 2, 3):
-        solid = plain[frame][..., 3] > 25  # of less, straight colours are mostly rounding
+        solid = plain[frame][..., 3] > 25  # of less, straight colors are mostly rounding
         same_pixels(shown[frame][solid][None], plain[frame][solid][None], 1)
         same_pixels(shown[frame][..., 3:], plain[frame][..., 3:], 1)
         assert plain[frame][..., 0].std() > 20

@@ -183,7 +183,7 @@ def test_what_was_not_exposed_comes_from_the_nearest_clear_frame(device):
 
 
 def of_two_colours(matte):
-    """Footage of one colour, and of another where a layer has some of a matte (COUNT, h, w)."""
+    """Footage of one color, and of another where a layer has some of a matte (COUNT, h, w)."""
     source = footage(np.random.default_rng(10), COUNT, SIZE)
     source.frames[:] = [200, 100, 50, 255]
     source.frames[matte > 0] = [0, 0, 255, 255]

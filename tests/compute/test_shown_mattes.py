@@ -1,4 +1,4 @@
-"""What previews show of mattes: the shutters' colours with their patterns, the same by Blender's GPU and NumPy."""
+"""What previews show of mattes: the shutters' colors with their patterns, the same by Blender's GPU and NumPy."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ TO_CLIP = np.array([[2 / WIDTH, 0, 0, -1], [0, 2 / HEIGHT, 0, -1], [0, 0, 1, 0],
 
 @pytest.fixture(scope="module")
 def given():
-    """Colours (S, 3), the first two dark, and coefficients (H / BLOCK, W / BLOCK, S), top row first; some texels are of
+    """Colors (S, 3), the first two dark, and coefficients (H / BLOCK, W / BLOCK, S), top row first; some texels are of
     one shutter alone, as most are."""
     random = np.random.default_rng(1)
     colors = random.uniform(0.5, 1, (SHUTTERS, 3))
@@ -78,7 +78,7 @@ def test_the_reference_is_drawn(given, unit):
 @pytest.mark.usefixtures("blender_device")
 @pytest.mark.parametrize("unit", [1.0, 2.0])
 def test_a_line_stands_around_what_a_shutter_gets(given, unit):
-    """As wide as a unit of the interface is, in its colour; none around the first one."""
+    """As wide as a unit of the interface is, in its color; none around the first one."""
     colors, shares = given[0], np.zeros_like(given[1])
     shares[:, :6, 0] = shares[:, 6:, 5] = 1
     picture = drawn(colors, shares, unit, "EDGES")

@@ -46,7 +46,7 @@ def with_way(source, **way):
 
 
 def test_the_location_alone_is_followed():
-    """The centre goes where it went, and nothing turns or grows about it."""
+    """The center goes where it went, and nothing turns or grows about it."""
     found = followed(with_way(made(WHIRL), follow_motion="location"), 1, 0).at([0, 1])
     assert found[0] == pytest.approx(np.ones((2, 1)))
     assert found[1][1, 0] == pytest.approx(6.4)

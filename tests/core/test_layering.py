@@ -70,7 +70,7 @@ HEIGHT, WIDTH = 90, 120
 
 
 def smooth(rng, *shape):
-    """Colours (H, W, C) that change from place to place by waves."""
+    """Colors (H, W, C) that change from place to place by waves."""
     y, x = np.mgrid[: shape[0], : shape[1]][..., None] / 10
     waves = rng.uniform(-1, 1, (2, 1, 1, shape[2])), rng.uniform(0, 6, (1, 1, shape[2]))
     return (0.5 + 0.4 * np.sin(waves[0][0] * x + waves[0][1] * y + waves[1])).astype(np.float32)

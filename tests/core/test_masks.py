@@ -29,7 +29,7 @@ def covered(splines, size, **layer):
 
 
 def places(size):
-    """Pixel centres (H, W, 2) in mask space."""
+    """Pixel centers (H, W, 2) in mask space."""
     width, height = size
     x, y = np.meshgrid(np.arange(width) + 0.5, height - 0.5 - np.arange(height))
     larger = max(size)

@@ -33,7 +33,7 @@ def test_a_line_from_far_away_to_far_away(far, line_width):
     long = Shape(0, "line", line_width, (np.array([[-far, -far * 0.5], [far, far * 0.5]]) + 0.5,))
     short = Shape(0, "line", line_width, (np.array([[-4.0, -2.0], [4.0, 2.0]]) + 0.5,))
     different = scribbles.rasterise([long], 320, 180) != scribbles.rasterise([short], 320, 180)
-    assert different.sum() <= 2  # pixels whose centres lie on its edge
+    assert different.sum() <= 2  # pixels whose centers lie on its edge
 
 
 def test_a_thick_line_of_many_points_is_soon_drawn():

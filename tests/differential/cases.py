@@ -241,7 +241,7 @@ def add_combining(rng, recipe: dict, count: int, mixed: bool) -> None:
 
 def add_others(rng, recipe: dict, count: int) -> None:
     """What the reference knows nothing of: how motion is followed, lengths on the timeline, opacities of scribbles,
-    equal names, moments between frames, colours of edges."""
+    equal names, moments between frames, colors of edges."""
 
     def share():
         return choose(rng, 1, 0, round(rng.random(), 3), random_numbers(rng, count, 1))
@@ -390,7 +390,7 @@ def random_key(rng, kind: str, frame: int) -> dict:
 
 def random_footage(rng, kind: Kind, shape, uncovered: bool) -> np.ndarray:
     """Frames (count, H, W, 4) as they are stored: half noise and half gradients that move, with black, white and, where
-    the type holds it, more than white, less than black, and colours above their alpha.
+    the type holds it, more than white, less than black, and colors above their alpha.
 
     uncovered: with light where premultiplied alpha is 0."""
     count, height, width = shape
@@ -413,7 +413,7 @@ def random_footage(rng, kind: Kind, shape, uncovered: bool) -> np.ndarray:
     if kind.alpha == "opaque":
         alpha = np.ones_like(alpha)
     elif kind.alpha == "premultiplied":
-        # Soft edges: straight colours of up to 6; below, nobody paints.
+        # Soft edges: straight colors of up to 6; below, nobody paints.
         alpha = np.where(alpha < 0.04, 0, alpha)
         colour = np.clip(colour, -6 * alpha, np.where(alpha > 0, 6 * alpha, 0.5) if uncovered else 6 * alpha)
         alpha = alpha if is_float else np.round(alpha * 65535) / 65535

@@ -105,7 +105,7 @@ def check(case: Case, devices: dict, folder: Path) -> dict:
 
 def is_referable(case: Case) -> bool:
     """Whether the reference knows all that the recipe has: it has no moments between frames, of which the reference
-    knows the weights alone, and no estimate of colours."""
+    knows the weights alone, and no estimate of colors."""
     recipe = json.loads(case.recipe)
     return recipe.get("inbetween", 1) == 1 and not ("plate_reach" in recipe and recipe["decontaminate"])
 

@@ -6,7 +6,7 @@ solve; lassos by the angles that their points run through; eases by de Casteljau
 pictures.
 
 What neither the paper nor the manual says is taken from the product; these are decisions, not results:
-- a line is never thinner than √2 pixels; so is the outline of a lasso that encloses no pixel's centre;
+- a line is never thinner than √2 pixels; so is the outline of a lasso that encloses no pixel's center;
 - halfway between two filmed frames, the lightest and the darkest count the mean of both bars; in reverse a window's
   first moments are those behind its first filmed frame;
 - with `aggregate` scribbles are drawn into the grid of blocks as if it was the picture;
@@ -29,8 +29,8 @@ What neither the paper nor the manual says is taken from the product; these are 
 - mattes lie over what scribbles give, whichever comes first in the list; a ramp at rest runs from one corner of the
   picture to the opposite one; a feather is a Gaussian of a quarter of its width, of which a pixel has what it covers;
 - of shutters that combine alike, the lightest and darkest frames are weighted by the displaced bars over the mixed
-  peak of theirs; a median at exactly half of all weights is the mean of both its neighbours;
-- a premultiplied colour without cover (alpha 0) is light that is added to what lies below (as in Blender), and to a
+  peak of theirs; a median at exactly half of all weights is the mean of both its neighbors;
+- a premultiplied color without cover (alpha 0) is light that is added to what lies below (as in Blender), and to a
   threshold as light as a layer has of it. What it is among encoded values, nothing says; there this is no reference.
 
 A recipe is its JSON as a dictionary. Pictures are (H, W, 4) float64 with the top row first, scene-linear and
@@ -159,7 +159,7 @@ def drawn_at(region, frame, aspect):
 
 
 def middle(strokes):
-    """The centre of the box around strokes."""
+    """The center of the box around strokes."""
     points = np.concatenate(strokes)
     return complex(points.real.min() + points.real.max(), points.imag.min() + points.imag.max()) / 2
 
@@ -212,7 +212,7 @@ def painted(recipe, drawn, width, height):
     """As labels_at, of regions with their strokes and numbers."""
     block = option(recipe, "aggregate")
     w, h = -(-width // block), -(-height // block)
-    # A centre as a fraction of the grid's height and width, whose pixels need not be square.
+    # A center as a fraction of the grid's height and width, whose pixels need not be square.
     x, y = np.meshgrid((np.arange(w) + 0.5) / w, 1 - (np.arange(h) + 0.5) / h)
     labels = np.full((h, w), -1)
     if option(recipe, "border"):
@@ -288,7 +288,7 @@ def channel_of(samples, channel):
 
 
 def ramp(region, frame, width, height):
-    """The values (H, W) of a ramp at a frame; places are complex, in pixels from its centre on, y up."""
+    """The values (H, W) of a ramp at a frame; places are complex, in pixels from its center on, y up."""
     x, y, rotation, scale = placement(region["keys"], frame) if region.get("keys") else STILL
     column, row = np.meshgrid(np.arange(width) + 0.5, height - 0.5 - np.arange(height))
     centre = width * (0.5 + x) + 1j * height * (0.5 + y)
@@ -378,7 +378,7 @@ def solved(labels, count):
 
 
 def differences(n):
-    """Each of n cells less its neighbours in a row, whose ends are free: (n, n)."""
+    """Each of n cells less its neighbors in a row, whose ends are free: (n, n)."""
     neighbours = np.full(n, 2.0)
     neighbours[0] -= 1
     neighbours[-1] -= 1
@@ -453,7 +453,7 @@ def followed(recipe, shutter):
 
 
 def subject(recipe, name):
-    """A function of a timeline frame and the aspect that tells of what is followed its centre and its placement."""
+    """A function of a timeline frame and the aspect that tells of what is followed its center and its placement."""
     region = next((region for region in recipe["regions"] if name != "camera" and region["name"] == name), {})
     keys = recipe.get("camera") if name == "camera" else region.get("keys")
 
@@ -636,7 +636,7 @@ def covering(alpha):
 
 
 def summed(footage, index, light):
-    """A frame's light (H, W, 4) as it is summed: premultiplied, its straight colours linear or encoded."""
+    """A frame's light (H, W, 4) as it is summed: premultiplied, its straight colors linear or encoded."""
     colour, alpha = footage.samples[index][..., :3], footage.samples[index][..., 3:]
     if footage.alpha == "opaque":
         alpha = np.ones_like(alpha)

@@ -34,7 +34,7 @@ class Film(FrameSource):
 
 
 def picture(number, width=WIDTH, height=HEIGHT):
-    """The uint8 RGB picture of that number: its bits in the upper rows, a moving coloured ramp below."""
+    """The uint8 RGB picture of that number: its bits in the upper rows, a moving colored ramp below."""
     y, x = np.mgrid[:height, :width]
     ramp = np.stack([x * 2 + number, y * 4 + number * 3, 255 - x - y], -1) % 256
     bits = (number >> np.minimum(x // BLOCK, 7)) & 1
@@ -220,7 +220,7 @@ TAGS = {"both": (1, 0), "container": (1, 2), "frames": (2, 0), "neither": (2, 2)
 
 
 def tagged_movies(folder):
-    """Movies whose container and whose frames say what their colours are: both, either, neither, or not the same."""
+    """Movies whose container and whose frames say what their colors are: both, either, neither, or not the same."""
     for ending, (codec, pix_fmt, options, bits, names) in TAGGED.items():
         for which, (space, own) in TAGS.items():
             plain, path = folder / f"plain.{ending}", folder / f"{which}.{ending}"

@@ -79,7 +79,7 @@ def test_frames_are_mixed_in_linear_light(size):
 
 
 def blocks(seed, size=(HEIGHT, WIDTH)):
-    """A picture (H, W, 3) of blocks in any colours, 0 to 1."""
+    """A picture (H, W, 3) of blocks in any colors, 0 to 1."""
     coarse = np.random.default_rng(seed).random((size[0] // 4 + 1, size[1] // 4 + 1, 3))
     return np.kron(coarse, np.ones((4, 4, 1)))[: size[0], : size[1]]
 
@@ -124,7 +124,7 @@ def test_what_fills_less_than_half_of_the_picture_may_be_new():
 @pytest.mark.parametrize("alpha", ["straight", "premultiplied"])
 @pytest.mark.parametrize("transfer", ["srgb", "linear"])
 def test_alpha_and_transfer_stay_as_they_are(alpha, transfer):
-    """A red disc on clear ground moves; its colour has no dark seam, and clear ground stays clear."""
+    """A red disc on clear ground moves; its color has no dark seam, and clear ground stays clear."""
 
     def disc(x):
         rows, columns = np.mgrid[:HEIGHT, :WIDTH]

@@ -26,7 +26,7 @@ def disc(x, ground=60):
 
 
 def place(picture, ground=60):
-    """Where a disc lies: its centre of mass, in pixels."""
+    """Where a disc lies: its center of mass, in pixels."""
     seen = picture[..., 0].astype(float) - ground
     seen[seen < 40] = 0  # grain
     return (seen * np.arange(WIDTH)).sum() / seen.sum()

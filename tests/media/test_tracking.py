@@ -345,7 +345,7 @@ class CutOut(Film):
 
 @pytest.mark.parametrize(("kind", "dtype"), [("line", np.uint8), ("lasso", np.float32)])
 def test_colours_that_are_hidden_mislead_nobody(subject, ground, kind, dtype):
-    """A weak subject that moves; beyond its edge, colours of a still ground with an alpha of 0."""
+    """A weak subject that moves; beyond its edge, colors of a still ground with an alpha of 0."""
     weak, mask = cv2.GaussianBlur(subject, (0, 0), 3), ellipse(MIDDLE, RADII)
     truth = [motion(4 * (n - 3)) for n in range(8)]
     frames = []

@@ -28,7 +28,7 @@ def to_encoded(linear: ArrayLike) -> np.ndarray:
 
 
 def premultiplied(rgba: np.ndarray, convert: Callable[[np.ndarray], np.ndarray] | None = None) -> np.ndarray:
-    """Convert straight RGBA (…, 4) to premultiplied. First apply `convert` to the colours (…, 3), not to alpha."""
+    """Convert straight RGBA (…, 4) to premultiplied. First apply `convert` to the colors (…, 3), not to alpha."""
     rgb = rgba[..., :3] if convert is None else convert(rgba[..., :3])
     return np.concatenate([rgb * rgba[..., 3:], rgba[..., 3:]], axis=-1)
 
@@ -55,7 +55,7 @@ def over_black(frame: np.ndarray, alpha: str) -> np.ndarray:
 
 
 def straight(rgba: np.ndarray) -> np.ndarray:
-    """Convert premultiplied RGBA (…, 4) to straight. Transparent pixels keep their colours: they may emit light."""
+    """Convert premultiplied RGBA (…, 4) to straight. Transparent pixels keep their colors: they may emit light."""
     return np.concatenate([rgba[..., :3] / _cover(rgba), rgba[..., 3:]], axis=-1)
 
 
@@ -66,6 +66,6 @@ def linearised(rgba: np.ndarray) -> np.ndarray:
 
 
 def _cover(rgba: np.ndarray) -> np.ndarray:
-    """Return the factor (…, 1) that premultiplied colours contain: alpha, or 1 where alpha is 0 within rounding."""
+    """Return the factor (…, 1) that premultiplied colors contain: alpha, or 1 where alpha is 0 within rounding."""
     alpha = rgba[..., 3:]
     return np.where(alpha > 1e-6, alpha, 1)  # a smaller alpha is rounding and counts as transparent

@@ -149,7 +149,7 @@ def _arc(
     Returns:
         The place, in the unit of RetimingKey.factor.
     """
-    # Its centre is on both normals, where x + slope·y is the same as at the key.
+    # Its center is on both normals, where x + slope·y is the same as at the key.
     slopes = np.array([[1.0, speed_in], [1.0, speed_out]])
     sums = [first.index + speed_in * first.factor, second.index + speed_out * second.factor]
     x, y = np.linalg.solve(slopes, sums)

@@ -38,8 +38,8 @@ class Moves:
 
     Attributes:
         location: Channel of the shift (x, y): x in fractions of the picture's width, y of its height, y up.
-        rotation: Channel of degrees, counter-clockwise, about the centre (Subject.centre).
-        scale: Channel of a factor, about the same centre.
+        rotation: Channel of degrees, counter-clockwise, about the center (Subject.centre).
+        scale: Channel of a factor, about the same center.
     """
 
     location: Channel = field(default=keyframes.Constant((0.0, 0.0)))
@@ -75,8 +75,8 @@ class Subject:
 
     Attributes:
         moves: The subject's placement over time.
-        drawings: Strokes; the subject turns and scales about the centre of their bounding box. None: it turns and
-            scales about the picture's centre.
+        drawings: Strokes; the subject turns and scales about the center of their bounding box. None: it turns and
+            scales about the picture's center.
     """
 
     moves: Moves
@@ -90,8 +90,8 @@ class Subject:
         """Return the point about which the subject turns and scales at a frame.
 
         Returns:
-            The point (x, y) in fractions of the picture, y up: the centre of the bounding box of the strokes, before
-            keys move them. The picture's centre, if the subject has no drawings. None, if it has drawings, but no
+            The point (x, y) in fractions of the picture, y up: the center of the bounding box of the strokes, before
+            keys move them. The picture's center, if the subject has no drawings. None, if it has drawings, but no
             strokes at this frame.
 
         Raises:
@@ -171,7 +171,7 @@ class MatteRegion(AnyRegion):
     """A region whose matte says how much of the shutter each pixel gets, 0 to 1.
 
     `moves` shifts, turns and scales a ramp. Any other matte stays where it is: there, `moves` only describes how the
-    object under it moves, for shutters that follow the region. Without drawings, the centre is the picture's.
+    object under it moves, for shutters that follow the region. Without drawings, the center is the picture's.
 
     Attributes:
         content: What gives the matte's values: a channel of mattes.Content. In an effect that was just read from a
@@ -231,7 +231,7 @@ class OutlineRegion(MatteRegion):
 class SubjectRegion(MatteRegion):
     """A region whose matte is a subject (a person, an animal, a thing) that a segmentation model finds under strokes.
 
-    The region's rotation and scale are about the centre of `drawings` or, if there are none, of `outlines`.
+    The region's rotation and scale are about the center of `drawings` or, if there are none, of `outlines`.
 
     Attributes:
         drawings: Strokes on the subject.
@@ -315,7 +315,7 @@ def placed_ramp(kind: mattes.RampKind, moves: Moves) -> Channel:
 class Camera(Subject):
     """How the filmed scene moves in the picture because the camera moved, so that shutters can follow that motion.
 
-    `drawings` is None: rotation and scale are about the picture's centre.
+    `drawings` is None: rotation and scale are about the picture's center.
 
     Attributes:
         influence: Channel of 0 to 1 by which exposures that follow the camera are shortened: 1 leaves their length, 0

@@ -33,7 +33,7 @@ class Combine:
             luminance, instead of comparing each color channel by itself.
         threshold: A luminance in linear light; white is 1. A frame's pixel counts only if it is brighter ("lightest")
             or darker ("darkest"). The shown frame's pixels always count. None: all pixels count.
-        softness: The width of the range of luminance, centred on the threshold, in which pixels count in part.
+        softness: The width of the range of luminance, centered on the threshold, in which pixels count in part.
     """
 
     mode: Mode = "average"

@@ -1,8 +1,8 @@
 """Blender's masks: their data at one frame, and their values for each pixel, as Blender's Mask strip shows them.
 
-Mask space is a square around the picture, as large as the picture's larger side and centred on it: x to the right and y
-up, from 0 to 1. Outlines are polygons in fractions of the picture: x to the right and y up from the lower left corner,
-from 0 to 1. Arrays have the picture's lowest row first, unless stated otherwise.
+Mask space is a square around the picture, as large as the picture's larger side and centered on it: x to the right and
+y up, from 0 to 1. Outlines are polygons in fractions of the picture: x to the right and y up from the lower left
+corner, from 0 to 1. Arrays have the picture's lowest row first, unless stated otherwise.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ _BLENDS: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
 
 @dataclass(frozen=True)
 class MaskSpline:
-    """A Bézier spline of a mask, in mask space: a square as large as the picture's larger side, centred on the picture.
+    """A Bézier spline of a mask, in mask space, a square as large as the picture's larger side and centered on it.
 
     Coordinates are 0 to 1 across that square, y up. All is in tuples, so that a spline is hashable.
 

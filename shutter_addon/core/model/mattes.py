@@ -90,12 +90,12 @@ class Ramp:
     """A gradient of values from 0 to 1 across the picture.
 
     A linear ramp rises from left to right; its start and end lie at the picture's outermost corners, at any rotation. A
-    radial one rises from the centre to 1 at the corners. An angle ramp rises clockwise from the top, once around the
-    centre, and jumps from 1 to 0 there. All this is before `placed` moves and scales the ramp.
+    radial one rises from the center to 1 at the corners. An angle ramp rises clockwise from the top, once around the
+    center, and jumps from 1 to 0 there. All this is before `placed` moves and scales the ramp.
 
     Attributes:
         kind: The ramp's shape: "linear", "radial" or "angle".
-        placed: Where the ramp lies: shifted, turned and scaled about the picture's centre. Scale does not change an
+        placed: Where the ramp lies: shifted, turned and scaled about the picture's center. Scale does not change an
             angle ramp. A negative scale adds half a turn to any ramp.
     """
 

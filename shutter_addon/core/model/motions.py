@@ -26,7 +26,7 @@ _CORNER = 0.5 + 0.5j
 
 @dataclass(frozen=True)
 class Placement:
-    """How the keys of a region or of the camera move it at a frame, about its centre (see scribbles.transform).
+    """How the keys of a region or of the camera move it at a frame, about its center (see scribbles.transform).
 
     Attributes:
         location: By how much it is shifted: x as a fraction of the picture's width, y of its height, y up.
@@ -71,7 +71,7 @@ class Similarity:
 
 
 def centre(strokes: Iterable) -> np.ndarray:
-    """Return the centre (2,) of the bounding box of all strokes, about which they scale and turn."""
+    """Return the center (2,) of the bounding box of all strokes, about which they scale and turn."""
     points = _points(strokes)
     return (points.min(axis=0) + points.max(axis=0)) / 2
 
@@ -88,7 +88,7 @@ def corners(strokes: Iterable) -> np.ndarray:
 
 
 def offsets(strokes: Iterable) -> np.ndarray:
-    """Return all points (n, 2) of strokes relative to the strokes' common centre, in fractions of the picture."""
+    """Return all points (n, 2) of strokes relative to the strokes' common center, in fractions of the picture."""
     return _points(strokes) - centre(strokes)
 
 
@@ -114,7 +114,7 @@ def carried(placement: Placement, motion: Similarity, before: np.ndarray, after:
     Args:
         placement: The region's placement at the motion's start.
         motion: The motion of the picture from its start to its end.
-        before, after: Centres (2,) of what is drawn of the region, before any placement, at the motion's start and end,
+        before, after: Centers (2,) of what is drawn of the region, before any placement, at the motion's start and end,
             in fractions of the picture. They differ if the drawing changes.
         size: Width and height of the picture, in pixels, in which the motion is measured.
     """
@@ -131,7 +131,7 @@ def motion_between(
 
     Args:
         first, second: The shape's placements at the motion's start and end.
-        before, after: Centres (2,) of what is drawn, before any placement, at the motion's start and end, in fractions
+        before, after: Centers (2,) of what is drawn, before any placement, at the motion's start and end, in fractions
             of the picture.
         size: Width and height of the picture, in pixels.
     """
@@ -178,7 +178,7 @@ def thinned(
 
     Args:
         placements: The shape's placement at each frame.
-        points: Points (n, 2) of the shape relative to its centre, in fractions of the picture, from `offsets`.
+        points: Points (n, 2) of the shape relative to its center, in fractions of the picture, from `offsets`.
         size: Width and height of the picture, in pixels.
         kept: Frames that must be keys; those without a placement do not count.
         tolerance: The largest error, in pixels.
@@ -223,7 +223,7 @@ def _distances(frames: np.ndarray, numbers: np.ndarray, points: np.ndarray, size
     Args:
         frames: The frames (f,), ascending, at least 2.
         numbers: The true placements (f, 4) at these frames, as from `as_array`.
-        points: The shape's points, complex numbers x + iy in pixels relative to its centre.
+        points: The shape's points, complex numbers x + iy in pixels relative to its center.
         size: Width and height of the picture, in pixels.
 
     Returns:

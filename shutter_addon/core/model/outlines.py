@@ -105,12 +105,12 @@ def dragged(
 
 
 def _finer(shape: Sequence, aspect: float, most: float) -> tuple[np.ndarray, np.ndarray]:
-    """Add points to a closed curve until neighbours are close to each other. Its shape stays.
+    """Add points to a closed curve until neighbors are close to each other. Its shape stays.
 
     Args:
         shape: The curve, (n, 2) in fractions of the picture.
         aspect: The picture's width / height.
-        most: The largest distance between two neighbouring points, in heights of the picture.
+        most: The largest distance between two neighboring points, in heights of the picture.
 
     Returns:
         All points (m, 2) in the curve's order, and a mask (m,) bool that is true for the curve's original points.

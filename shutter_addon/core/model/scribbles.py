@@ -109,7 +109,7 @@ def mapped(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:
 def transform(
     strokes: Iterable[ArrayLike], location: ArrayLike, rotation: float, scale: float, aspect: float
 ) -> tuple[np.ndarray, ...]:
-    """Return strokes scaled, turned and moved, all about the centre of their common bounding box.
+    """Return strokes scaled, turned and moved, all about the center of their common bounding box.
 
     Args:
         strokes: Points (n, 2) each, in fractions of the picture, y up.
@@ -132,7 +132,7 @@ def taken_back(
 ) -> tuple[np.ndarray, ...]:
     """Return the strokes that `transform` would turn into the given ones, for the same other arguments."""
     strokes = tuple(np.asarray(s, dtype=np.float64) for s in strokes)
-    turned = transform(strokes, (0, 0), -rotation, 1 / scale, aspect)  # the centre may differ
+    turned = transform(strokes, (0, 0), -rotation, 1 / scale, aspect)  # the center may differ
     (there, *_) = transform(turned, location, rotation, scale, aspect)
     return tuple(points + (np.asarray(strokes[0]) - there)[0] for points in turned)
 
@@ -179,7 +179,7 @@ class Drawings:
         return between_strokes(self.drawing(before, frame), self.drawing(after, frame), share, self.aspect)
 
     def moved(self, frame: float, placed: Placement) -> tuple[np.ndarray, ...]:
-        """Return the strokes at a frame, moved, turned and scaled about their centre by the region's keys.
+        """Return the strokes at a frame, moved, turned and scaled about their center by the region's keys.
 
         Args:
             frame: The frame.

@@ -251,7 +251,7 @@ def smoothed(bars: ArrayLike, steps: int, *, backward: bool = False, level: bool
     """Spread the bars (L,) of filmed frames over moments, which are filmed frames and those made between them.
 
     The time between two filmed frames is exposed only if both bars are open. Then each bar spreads its weight evenly
-    over its half of the interval towards each open neighbour. A bar without open neighbours exposes its filmed frame
+    over its half of the interval towards each open neighbor. A bar without open neighbors exposes its filmed frame
     only.
 
     Args:

@@ -188,7 +188,7 @@ def _between(region: Region, frame: float, share: float) -> scribbles.Shape:
 # Below this scale a subject is a point, which does not tell where other points are.
 _SMALLEST = 1e-6
 
-# Gives placement and centre (2,) at a frame; the centre is None if nothing is drawn.
+# Gives placement and center (2,) at a frame; the center is None if nothing is drawn.
 Places = Callable[[float], tuple[Placement, np.ndarray | None]]
 
 
@@ -328,14 +328,14 @@ def smoothing(smooth: int) -> np.ndarray:
 
 
 def places_of(subject: Subject, motion: motions.Motion = "scale", smooth: int = 0) -> Places:
-    """Return a function that gives a subject's placement and centre at a timeline frame, as a shutter follows it.
+    """Return a function that gives a subject's placement and center at a timeline frame, as a shutter follows it.
 
-    The centre is None where nothing is drawn, or with smoothing, at any of the averaged frames.
+    The center is None where nothing is drawn, or with smoothing, at any of the averaged frames.
 
     Args:
         subject: The region or camera.
         motion: Which of the placement's parts are used, as in motions.only; the others have no effect.
-        smooth: How many frames on each side placement and centre are averaged over (`smoothing`). 0: they are not.
+        smooth: How many frames on each side placement and center are averaged over (`smoothing`). 0: they are not.
     """
 
     @cache

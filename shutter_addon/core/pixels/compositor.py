@@ -21,7 +21,7 @@ from ..frames import light
 from ..model import shutters
 from ..model.frame_state import Combine, FrameState
 
-# If a median's weights are this close to the middle, both neighbours count, as with an even number of frames. Rounding
+# If a median's weights are this close to the middle, both neighbors count, as with an even number of frames. Rounding
 # must not choose between them, since devices round differently.
 MIDDLE = 1 / 8192
 
@@ -359,7 +359,7 @@ def seen(frame: np.ndarray, places: np.ndarray, *, sharp: bool) -> np.ndarray:
         frame: The frame (H, W, C). Beyond its edges the last pixels are repeated.
         places: The places (…), complex numbers x + iy in pixels, y down, as in motions.Similarity.
         sharp: Whether to use a Catmull-Rom cubic, limited to the range of the four nearest pixels, so that it does not
-            ring. Otherwise linear interpolation is used, as colours with alpha need.
+            ring. Otherwise linear interpolation is used, as colors with alpha need.
     """
     height, width = frame.shape[:2]
     # Far outside everything is the same, and large numbers have no fractions.

@@ -1,4 +1,4 @@
-"""Conductances between neighbouring pixels: how freely the coefficients of shutters spread from one to the other.
+"""Conductances between neighboring pixels: how freely the coefficients of shutters spread from one to the other.
 
 They are small at edges of a picture, the guide, so that the effect of scribbles ends there. Every cell of the guide has
 a resistance, from 1 where it is flat to 1 / FLOOR at an edge, by the steeper of its horizontal and vertical slopes: an
@@ -22,7 +22,7 @@ def resistances(guide: np.ndarray, strength: float) -> np.ndarray:
     """Return how strongly each cell of a guide resists diffusion, (h, w) float32 from 1 (flat) to 1 / FLOOR (edge).
 
     Args:
-        guide: The picture at whose edges scribbles stop, (h, w, 3 or more), finite: display colours 0 … 1, scaled by
+        guide: The picture at whose edges scribbles stop, (h, w, 3 or more), finite: display colors 0 … 1, scaled by
             the number of cells along the picture's shorter side / 240 (compute/guide.py). The first three channels
             count.
         strength: 0 … 1, how strictly scribbles stop at edges; 0 gives 1 everywhere.
@@ -63,14 +63,14 @@ def of_pixels(cells: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
 
 
 def conductances(guide: np.ndarray, strength: float, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-    """Return how freely coefficients spread between neighbouring pixels (conductances), float64 from FLOOR to 1.
+    """Return how freely coefficients spread between neighboring pixels (conductances), float64 from FLOOR to 1.
 
     Args:
         guide, strength: As for `resistances`.
         shape: The picture's (h, w) pixels; a cell of the guide is a square of 1, 2, 4 … pixels a side.
 
     Returns:
-        Two arrays: between each pixel and its right neighbour, (h, w − 1), and between each pixel and the one below it,
+        Two arrays: between each pixel and its right neighbor, (h, w − 1), and between each pixel and the one below it,
         (h − 1, w).
     """
     pixels = of_pixels(resistances(guide, strength).astype(np.float64), shape)

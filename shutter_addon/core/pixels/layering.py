@@ -66,9 +66,9 @@ def with_plate(sums: np.ndarray, clear: np.ndarray, plate: np.ndarray | None) ->
 
 
 def separated(colors: np.ndarray, matte: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Separate the colours of a subject from those of its background in pixels that mix both.
+    """Separate the colors of a subject from those of its background in pixels that mix both.
 
-    A mixed pixel at the subject's edge is m · subject + (1 − m) · background, with m its matte value. Both colours are
+    A mixed pixel at the subject's edge is m · subject + (1 − m) · background, with m its matte value. Both colors are
     estimated from the surroundings.
 
     Args:
@@ -76,8 +76,8 @@ def separated(colors: np.ndarray, matte: np.ndarray) -> tuple[np.ndarray, np.nda
         matte: The subject's matte (H, W), 0 to 1. Pixels where it is neither 0 nor 1 are mixed.
 
     Returns:
-        The subject's colours and the background's, (H, W, C) float32 each. In pixels that are not mixed, both are the
-        colours given.
+        The subject's colors and the background's, (H, W, C) float32 each. In pixels that are not mixed, both are the
+        colors given.
     """
     own, behind = colors.copy(), colors.copy()
     mixed = (matte > 0) & (matte < 1)
@@ -85,7 +85,7 @@ def separated(colors: np.ndarray, matte: np.ndarray) -> tuple[np.ndarray, np.nda
     wide, near = max(round(height * WIDE), 2), max(round(height * NEAR), 1)
     if (box := box_around(mixed, wide + near)) is None:
         return own, behind
-    # Planes of colours (C, h, w), which NumPy sums faster than pixels.
+    # Planes of colors (C, h, w), which NumPy sums faster than pixels.
     picture, m = np.moveaxis(colors[box], -1, 0).copy(), matte[box].astype(np.float32)
     first, second = _nearer(picture, m, *_surroundings(picture, picture, m, wide, np.ogrid[: len(m), : m.shape[1]]))
     inside = mixed[box]
@@ -96,19 +96,19 @@ def separated(colors: np.ndarray, matte: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 def _nearer(picture: np.ndarray, matte: np.ndarray, own: np.ndarray, behind: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Correct estimated colours of a subject and its background so that their mix comes nearer to the picture.
+    """Correct estimated colors of a subject and its background so that their mix comes nearer to the picture.
 
-    A part of the error is added to the subject's colour, in proportion to its matte, and a part to the background's, in
+    A part of the error is added to the subject's color, in proportion to its matte, and a part to the background's, in
     proportion to 1 − matte. With a matte of 0 or 1 the mix becomes exact; at 0.5, half of the error remains.
 
     Args:
-        picture: The picture's colours (C, …), each a mix of the subject's and the background's.
+        picture: The picture's colors (C, …), each a mix of the subject's and the background's.
         matte: The subject's share in the mix (…), 0 to 1.
-        own: The estimated colours of the subject (C, …).
-        behind: The estimated colours of the background (C, …).
+        own: The estimated colors of the subject (C, …).
+        behind: The estimated colors of the background (C, …).
 
     Returns:
-        The corrected colours of the subject and those of the background, (C, …) each.
+        The corrected colors of the subject and those of the background, (C, …) each.
     """
     left = picture - matte * own - (1 - matte) * behind
     return own + matte * left, behind + (1 - matte) * left
@@ -117,14 +117,14 @@ def _nearer(picture: np.ndarray, matte: np.ndarray, own: np.ndarray, behind: np.
 def _surroundings(
     own: np.ndarray, behind: np.ndarray, matte: np.ndarray, radius: int, places: Sequence[np.ndarray]
 ) -> list[np.ndarray]:
-    """Estimate the colours of a subject and its background at some pixels: weighted means over the square around each.
+    """Estimate the colors of a subject and its background at some pixels: weighted means over the square around each.
 
     Each pixel in the square is weighted by the matte for the subject, and by 1 − matte for the background. To be quick,
     means for a large radius are computed on a grid of cells of several pixels.
 
     Args:
-        own: The subject's colours (C, h, w).
-        behind: The background's colours (C, h, w).
+        own: The subject's colors (C, h, w).
+        behind: The background's colors (C, h, w).
         matte: The subject's matte (h, w), 0 to 1.
         radius: How far the square reaches to each side, in pixels; only approximate where cells are used.
         places: The row indices and the column indices of the pixels, two integer arrays that broadcast to a shape (…).

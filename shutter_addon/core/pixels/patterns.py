@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 COUNT = 8  # plain, rising lines, dots, falling lines, horizontal, vertical, hatched, grid
-STRENGTH = 0.4  # opacity of the ink over a shutter's colour
+STRENGTH = 0.4  # opacity of the ink over a shutter's color
 _PERIOD, _SLANTED, _WIDTH, _RADIUS = 8.0, 12.0, 1.7, 1.8  # in units of the interface
 _OFF = 0.3  # keeps pixels' middles off the lines' edges, where rounding would decide
 

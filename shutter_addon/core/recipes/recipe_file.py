@@ -85,7 +85,7 @@ def parse(text: str) -> model.Effect:
     if isinstance(data, dict) and data.get("version") == 1:
         data.pop("inbetween_method", None)  # only one method is left
         if data.get("inbetween", 1) != 1:
-            data.setdefault("skip_repeats", False)  # the behaviour of version 1
+            data.setdefault("skip_repeats", False)  # the behavior of version 1
     converter = _converter()
     try:
         recipe: Any = converter.structure(data, records.RecipeRecord)

@@ -103,8 +103,8 @@ class MoveKey:
     Attributes:
         frame: The timeline frame of the key; 1 is the strip's first.
         location: How far it is shifted: x as a fraction of the picture's width, y of its height, y up.
-        rotation: How far it is turned about its centre, in degrees counter-clockwise.
-        scale: The factor by which it is enlarged about its centre.
+        rotation: How far it is turned about its center, in degrees counter-clockwise.
+        scale: The factor by which it is enlarged about its center.
         ease: How the placement changes from this key to the next one.
     """
 

@@ -32,19 +32,19 @@ WORKING = 512
 SLIM = 4  # pixels of a side that the working picture keeps: so many as a picture has at least that Blender renders
 FARTHEST = 100  # frames that a drawing is carried at most
 REACH, STEP = 6, 2  # pixels of the working picture, in which places lie that vote
-ALIKE = 6.0  # units of CIE Lab, its L halved: how far colours may differ
+ALIKE = 6.0  # units of CIE Lab, its L halved: how far colors may differ
 NEAR = 6.0  # pixels of the working picture: how far votes may come from
 AROUND = 0.5  # pixels: the standard deviation of what is compared around a place
 # What most votes say lies inside: less than half, for what is thin has more around it than of itself
 # (scripts/carried_mattes.py).
 INSIDE = 0.4
 EDGE = 0.4  # votes from 0 to 1 in the middle of an edge
-RADIUS, SMOOTHNESS = 3, 1e-3  # of the guided filter: pixels of the working picture, and a variance of colours of 0 to 1
+RADIUS, SMOOTHNESS = 3, 1e-3  # of the guided filter: pixels of the working picture, and a variance of colors of 0 to 1
 # Of the filters that explain the result, in their order: the wide ones find an edge that lies beside its place.
 EXPLAINING, EXACT = (19, 9), 1e-6
-# Shares of its variance around a pixel that colours explain: none of that is believed below, and all above.
+# Shares of its variance around a pixel that colors explain: none of that is believed below, and all above.
 DOUBTED, BELIEVED = 0.9, 0.97
-STEEPER = 1.05  # what colours explain is never quite 0 or 1
+STEEPER = 1.05  # what colors explain is never quite 0 or 1
 # Where a place has moved by hardly more, in pixels of the working picture, and looks hardly more different than noise
 # makes it, in units of CIE Lab, the matte keeps so much of the one before.
 STILL, CHANGED, QUIET = 0.5, 4.0, 0.9

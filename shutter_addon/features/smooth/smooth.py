@@ -43,7 +43,7 @@ _THERE_AND_BACK = 0.2, 0.5  # of a vector, and pixels beside that, by which the 
 # sharp lettering. Edges of footage are some 2 pixels wide, however small it is.
 _SMOOTH, _SMOOTH_PIXELS = 3 / 1080, 2.0
 _KNOWN = 0.25  # of the picture whose motion has to be known: across a cut, that of little is
-_PAIRS = 8  # of neighbouring frames, spread over the footage, that "auto" looks at
+_PAIRS = 8  # of neighboring frames, spread over the footage, that "auto" looks at
 _FRAMES = MOST + 2  # frames that are kept: those that say what repeats
 
 
