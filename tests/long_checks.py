@@ -69,7 +69,7 @@ GROUPS = {
 
 
 def _content(file: Path) -> bytes:
-    """Return what of a file a test depends on: of Python code, neither docstrings nor comments."""
+    """Return what counts of a file: of Python code, neither docstrings nor comments. It differs between Pythons."""
     if file.suffix != ".py":
         return file.read_bytes()
     tree = ast.parse(file.read_bytes())

@@ -11,7 +11,8 @@ from ..core.messages import MediaError
 from .files import check_name
 from .rendered_pictures import UNKNOWN, why_short
 
-QUICK = 3  # PNG's compression level, 0 to 9. It takes three quarters of the usual time; mattes get a fourth larger.
+# PNG's compression level, 0 to 9. Mattes take three quarters of the usual time, and get a fourth larger.
+_COMPRESSION = 3
 
 
 def write_exr(path: Path, values: np.ndarray, names: Sequence[str], note: str = "") -> None:
@@ -53,7 +54,7 @@ def write_levels(path: Path, levels: np.ndarray, description: str) -> None:
     Raises:
         MediaError: The file cannot be written.
     """
-    _write(path, levels[..., None], {"ImageDescription": description, "png:compressionLevel": QUICK})
+    _write(path, levels[..., None], {"ImageDescription": description, "png:compressionLevel": _COMPRESSION})
 
 
 def _write(path: Path, samples: np.ndarray, attributes: dict[str, str | int], names: Sequence[str] = ()) -> None:

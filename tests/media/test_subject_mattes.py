@@ -106,6 +106,13 @@ def test_processes_make_the_same_mattes_and_nothing_twice(opened, tmp_path):
     assert not np.array_equal(more.read(2), alone.read(2))
 
 
+def test_deleted_mattes_are_made_again(opened, tmp_path):
+    mattes = opened({0: [on_first(0)]})
+    made = mattes.read(2)
+    shutil.rmtree(tmp_path / "mattes")
+    assert np.array_equal(mattes.read(2), made)
+
+
 def test_it_ends_at_a_cut(opened):
     mattes = opened({1: [on_first(1)]}, count=30, cut=3)
     assert iou(mattes.read(2), figures(2)[0]) > 0.9

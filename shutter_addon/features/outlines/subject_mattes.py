@@ -446,7 +446,7 @@ class SubjectMattes(CarriedMattes):
             around = [self._keys[end] for end in nearest(frame, self._showing) if end is not None]
             self._keys[frame] = derived.key({"strokes": self._keys[frame], "around": around})
         self._before: tuple[int, np.ndarray, np.ndarray] | None = None
-        self._written: tuple[Path, np.ndarray] | None = None
+        self._written: tuple[Path, np.ndarray, float] | None = None
 
     def read(self, index: int) -> np.ndarray:
         """Return a frame's matte, (height, width) float32, 0 to 1. Without any keyframes, it is empty.
@@ -511,11 +511,11 @@ class SubjectMattes(CarriedMattes):
         return [(path, weight / total, sure) for path, weight, sure in sides]
 
     def _sure(self, index: int, end: int) -> float | None:
-        """Return the confidence of a frame's matte in the chain from the keyframe `end`; None: no file keeps it."""
+        """Return the confidence of a frame's matte in the chain from keyframe `end`, or GONE; None: no file has it."""
         return self._described(self._path(index, end, None))
 
     def _make(self, index: int, end: int) -> None:
-        """Make and write those mattes of a chain, from its keyframe `end` to a frame, that no files keep yet."""
+        """Make and write a chain's mattes up to a frame, from its keyframe `end` or the last that a file keeps."""
         step = 1 if index > end else -1
         start = index
         while start != end and self._sure(start, end) is None:
@@ -534,11 +534,7 @@ class SubjectMattes(CarriedMattes):
             levels[(levels < EXCLUDED) & (_fitted(excluded, levels) > 0.5)] = EXCLUDED
         path = self._path(frame, end, None)
         write_levels(path, levels, f"{CONFIDENCE}{sure:.3f}")
-        self._written = path, levels
-
-    def _kept(self, path: Path) -> np.ndarray | None:
-        # The last one is read again for the frame after it, and need not be decoded.
-        return self._written[1] if self._written and self._written[0] == path else super()._kept(path)
+        self._written = path, levels, round(sure, 3)
 
     def _first(self, frame: int) -> tuple[np.ndarray, np.ndarray, float]:
         """Make the matte of a keyframe (with strokes or a drawing), at which a chain of mattes begins.
@@ -577,13 +573,17 @@ class SubjectMattes(CarriedMattes):
             matte is empty and the confidence is GONE.
         """
         path = self._path(before, end, None)
-        matte, sure = self._kept(path), self._described(path)
+        if (written := self._written) is not None and written[0] == path:
+            matte, sure = written[1:]
+        else:
+            matte, sure = self._kept(path), self._described(path)
         low, high = sorted((before, frame))
         if matte is None or sure is None or sure == GONE or before not in self._shots.around(frame, low, high):
             return self._nothing(), self._nothing(), GONE
         (_, old), (picture, small) = (self._pictures(each) for each in (before, frame))
         size = small.shape[1::-1]
-        hidden, excluded = matte == EXCLUDED, np.zeros(small.shape[:2], np.float32)
+        hidden = matte == EXCLUDED
+        excluded = np.zeros(small.shape[:2], np.float32)
         if hidden.any():
             excluded = flow.resized(hidden.astype(np.float32), size)
         share = flow.resized(matte, size).astype(np.float32) / 255
