@@ -116,7 +116,7 @@ def _inflow(across: np.ndarray, down: np.ndarray, values: np.ndarray) -> np.ndar
     """Return the net flow into each cell (…, h, w) from its four neighbors.
 
     The flow between two cells is their conductance times the difference of their values. It is added to one and
-    subtracted from the other, so that the sum over all cells is exact.
+    subtracted from the other, so that flows cancel in the sum over all cells.
 
     Args:
         across, down: As for `_Grid`.

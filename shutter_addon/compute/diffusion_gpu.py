@@ -391,14 +391,11 @@ class Diffusion:
 
 
 def _in_fours(fixed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Divide cells into tiles of 4 × 4. Return which tiles contain fixed cells, and which contain free ones.
+    """Return which tiles of 4 × 4 cells contain a fixed cell, and which a free one: two arrays bool (⌈H/4⌉, ⌈W/4⌉).
 
     Args:
         fixed: (H, W) bool: which cells are fixed. Incomplete tiles at the edges are filled with the last row and
             column.
-
-    Returns:
-        Two arrays bool (⌈H/4⌉, ⌈W/4⌉): tiles with a fixed cell, and tiles with a free cell.
     """
     height, width = fixed.shape
     if height % 4 or width % 4:

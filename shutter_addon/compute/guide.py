@@ -152,9 +152,10 @@ class NotedSource(SourceWrapper):
 
 
 def _averaged(picture: np.ndarray, size: int) -> np.ndarray:
-    """Return the mean colors of squares of size × size pixels, (⌈H/size⌉, ⌈W/size⌉, 3) float32.
+    """Return the mean colors of squares of size × size pixels, (⌈H/size⌉, ⌈W/size⌉, 3).
 
-    Where a square reaches beyond the picture, the picture's last pixels are repeated.
+    They are float32, but float64 for integers if `size` is above 1. Where a square reaches beyond the picture, the
+    picture's last pixels are repeated.
 
     Args:
         picture: (H, W, 3 or 4); a fourth channel is ignored. Values of an integer type are divided by the type's

@@ -50,13 +50,13 @@ class Request:
         return self.source, self.index, self.direction, self.state.key, self.levels, self.display
 
     def positions(self, shot: range) -> np.ndarray:
-        """Return the frame numbers (n,) that any shutter exposes, in the window's order.
+        """Return the window's frame numbers (n,) from the first to the last that any shutter exposes, in its order.
 
         They may lie beyond the footage's ends, as core.model.windows.positions do.
 
-        With edges "shorten", frames beyond the shot are left out. If the shutters would expose such a frame, the result
-        is all frame numbers of the window that lie in the shot, since the nearest frame may take the place of a missing
-        one.
+        With edges "shorten", if one of them lies beyond the shot, the result is all frame numbers of the window that
+        lie in the shot, since the nearest frame may take the place of a missing one. If none lies there, it is the same
+        as with other edges.
 
         Args:
             shot: The source frames of the shot.

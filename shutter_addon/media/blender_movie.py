@@ -128,7 +128,7 @@ def ask(wanted: dict) -> tuple[dict, np.ndarray | None]:
         The answer's properties, and a frame (H, W, 4) if one was asked for.
 
     Raises:
-        MediaError: With the process's message, or because it has ended.
+        MediaError: The process cannot be started, ends without an answer, or answers with an error.
     """
     with BlenderMovie.decoder.asking:
         for _ in range(2):  # another movie may have ended it

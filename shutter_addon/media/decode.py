@@ -246,7 +246,11 @@ class _Run:
         self._frames.close()
 
     def advance(self) -> None:
-        """Go to the next frame: set `shown` to `next`, and decode the one after it."""
+        """Go to the next frame: set `shown` to `next`, and decode the one after it.
+
+        Raises:
+            MediaError: There is no frame to go on from: `shown` is None.
+        """
         self.passed = max(self.passed, _known(self).time)
         self.shown, self.is_first = self.next, False
         self.next = next(self._frames, None)

@@ -177,7 +177,7 @@ def own_folder(path: Path) -> None:
 
 
 def refuse_link(path: Path) -> None:
-    """Raise OSError if a path is a symbolic link, which could lead to files of other users."""
+    """Raise OSError if a path is a symbolic link or a junction, which could lead to files of other users."""
     if path.is_symlink() or path.is_junction():
         raise OSError(errno.ELOOP, "it is a link, and none is followed")
 

@@ -67,7 +67,7 @@ class Footage:
         return shots is not None and low != high and high not in shots.around(low, low, high)
 
     def _read(self, frame: int, index: int) -> None:
-        """Read the picture of a timeline frame into the cache (`_kept`), and others with it if they will be asked for.
+        """Read the picture of a timeline frame into the cache (`_kept`).
 
         If tracking goes backward, pictures of up to BLOCK announced frames (`want`) are read at once, in ascending
         order. Movies are decoded forward, so this takes little longer than one frame.

@@ -48,7 +48,7 @@ def write_levels(path: Path, levels: np.ndarray, description: str) -> None:
 
     Args:
         path: The file.
-        levels: The grey values, 0 to 255, top row first.
+        levels: The values, top row first.
         description: A text that is stored as "ImageDescription" in the metadata.
 
     Raises:

@@ -118,8 +118,9 @@ def open_edit(path: Path, asked: str | None = None, name: str | None = None) -> 
         The scene, and the timeline frames that were asked for.
 
     Raises:
-        UserError: The file cannot be opened, there is no such scene, a check failed, or the scene lacks these frames.
-            Also if the render setting `use_sequencer` of the scene is off, or `use_multiview` (stereoscopy) is on.
+        UserError: The file cannot be opened, there is no such scene, a check failed, or `asked` is malformed or not
+            within the scene's frames. Also if the scene's render setting `use_sequencer` is off, or `use_multiview`
+            (stereoscopy) is on.
     """
     if not path.is_file():
         raise UserError(f"{path}: " + ("is no file" if path.exists() else "no such file"))

@@ -241,8 +241,8 @@ def strips_of(region: PropertyGroup) -> list:
 def parts_for(region: PropertyGroup, effect_strip: Strip) -> list:
     """Return those of a region's matte strips (several if one was cut or copied) that overlap the effect strip in time.
 
-    If none does, return only the one nearest in time. The result is sorted by distance from the effect strip's first
-    frame to their first frame.
+    If none does, return only the one nearest to the effect strip's first frame. The result is sorted by distance from
+    that frame to their first frame.
 
     Raises:
         EffectError: The region has no matte strip.

@@ -27,8 +27,8 @@ class Shown(NamedTuple):
         effect: The effect.
         strip: The effect strip.
         strips_above: Whether visible strips lie in higher channels; they may cover it.
-        hides_strokes: For each region with strokes (all but mattes and ramps), in order, whether the user has hidden
-            its annotation layer.
+        hides_strokes: For each region with strokes (all but mattes and ramps) whose shutter exists, in order, whether
+            the user has hidden its annotation layer.
     """
 
     scene: Scene
@@ -42,8 +42,9 @@ class Look(NamedTuple):
     """How the previews of a scene show an effect's picture.
 
     Attributes:
-        scale: Screen pixels per pixel of the effect's picture in the largest preview: 1.0 at full size. With *Live*
-            off, the preview's resolution counts instead. None: no preview shows the scene.
+        scale: Pixels per pixel of the effect's picture in the largest preview, 1.0 at full size: of the preview's
+            resolution, or of the screen if that has fewer. With *Live* off, it is the resolution's percentage, as a
+            fraction. None: no preview shows the scene.
         proxy: The proxy file that Blender reads for the source in that preview. None: it reads the footage itself, or
             there is no preview.
         is_plain: Whether all previews show the strip's picture unchanged. Then a result may be drawn over it.

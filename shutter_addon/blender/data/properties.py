@@ -134,7 +134,7 @@ class TrackStop(PropertyGroup):
     """Where and why tracking a region or the camera ended early.
 
     Attributes:
-        frame: The frame where it ended, counted from the effect's start, so that it moves with the effect's strips.
+        frame: The first frame not reached, counted from the effect's start, so that it moves with the effect's strips.
         forward: Whether tracking went forward in time.
         fault: The reason, in English, for the user.
     """

@@ -120,7 +120,7 @@ def _baked_part(scene: Scene, strip: Strip) -> Any:
 
 
 def of_bake(scene: Scene, strip: Strip) -> list:
-    """Return all strips of the bake that a strip belongs to: effect strips and baked strips, the strip itself too."""
+    """Return all effect strips and baked strips of the bake that a strip belongs to, itself too; []: it has no bake."""
     identity = strip.virtual_shutter_bake.identity
     found = scene.sequence_editor.strips_all if identity else ()
     return [other for other in found if other.virtual_shutter_bake.identity == identity]

@@ -404,7 +404,8 @@ def _any_region(sampling: Sampling, index: int, shutter: int) -> model.Region | 
         shutter: Index of the region's shutter in the effect.
 
     Raises:
-        EffectError, MediaError: A matte has no content.
+        EffectError, MediaError: A matte has no content, a tracked outline or a subject has no source, or a setting is
+            invalid.
     """
     region, path = sampling.effect.regions[index], f"{sampling.path}.regions[{index}]"
     if region.kind not in strips.LAID:
@@ -433,7 +434,7 @@ def _drawn(sampling: Sampling, index: int) -> tuple[dict[str, Any], Any]:
         and "outlines". And a CarriedFile, or None for an outline that is not tracked (*Linear*).
 
     Raises:
-        EffectError, MediaError: There is no source.
+        EffectError, MediaError: The mattes are tracked, but there is no source, or its files cannot be read.
     """
     region = sampling.effect.regions[index]
     is_subject = region.kind == "SUBJECT"

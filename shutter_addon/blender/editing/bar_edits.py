@@ -101,11 +101,12 @@ def paint(effect: PropertyGroup, index: int, weights: Sequence[float] | np.ndarr
 def key_bars(effect: PropertyGroup, index: int) -> None:
     """Insert keyframes at the current frame for all bars of a shutter, with the weights of the picture there.
 
-    Between keys, these differ from the values of the bars' F-curves (see bars_now).
-
     Args:
         effect: The effect.
         index: Index of the shutter in the effect.
+
+    Raises:
+        EffectError: As for bars_now.
     """
     # Between keys, the values of F-curves differ from the bars that the picture uses.
     shutter, scene = effect.shutters[index], effect.id_data

@@ -179,9 +179,9 @@ def begin_drawing(effect: PropertyGroup, strip: Strip, index: int, *, erases: bo
     """Prepare a region's drawing at the current frame for the pen, so that strokes appear where they are drawn.
 
     If the region has moved since a drawing was made at this frame, store the drawing where it appears now. The eraser
-    also needs the strokes that appear here from another frame's drawing, so store a copy of them at this frame. If the
-    region was tracked, insert keyframes of the user's here. Do nothing for mattes, ramps, outlines and subjects
-    (strips.LAID).
+    also needs the strokes that appear here from another frame's drawing: if this frame has none, and the region has
+    moved since any was made, store a copy here. If the region was tracked, insert keyframes of the user's here. Do
+    nothing for mattes, ramps, outlines and subjects (strips.LAID).
 
     Args:
         index: Index of the region.

@@ -18,10 +18,10 @@ from ..rendering import previews
 
 
 def follow() -> None:
-    """Give each open preview the annotation of the effect that it shows at the playhead, for the pen to draw in.
+    """Give previews that have an effect's annotation that of the effect at the playhead, for the pen to draw in.
 
-    Never replace an annotation of the user's. Let Blender show an effect's annotation only while the pen is down; at
-    other times, our draw handler draws its strokes.
+    Without an effect there, take the annotation away until there is one. Never replace an annotation of the user's. Let
+    Blender show an effect's annotation only while the pen is down; at other times, our draw handler draws its strokes.
     """
     for window in bpy.data.window_managers[0].windows:
         seen = selection.seen(window.workspace.sequencer_scene or window.scene)

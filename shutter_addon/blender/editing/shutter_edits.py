@@ -31,8 +31,8 @@ def start(effect: PropertyGroup) -> None:
     """Set up a new effect: a shutter *Long* for the whole picture, a shutter *Sharp* for strokes, and some options.
 
     *Border* is on: the first stroke is sharp only around itself instead of everywhere. Streaks keep their length at the
-    ends of the clip, and are smooth if OpenCV is installed. These options are set here and not by defaults, because
-    recipes set them themselves, and older files have other defaults.
+    ends of the clip, and are smooth if OpenCV is installed. These are not the properties' defaults, on which recipes
+    and older files rely.
     """
     effect.border, effect.edges = True, "SLIDE"
     effect.inbetween = "1" if opencv.cv2 is None else "AUTO"
@@ -60,7 +60,7 @@ def add_shutter(effect: PropertyGroup, name: str = "", preset: str = "ANGLE_360"
 
 
 def apply_preset(effect: PropertyGroup, index: int, preset: str, key: bool = False) -> None:
-    """Give a shutter the bars of a preset. They adapt to later changes of the window until they are edited or keyed.
+    """Give a shutter the bars of a preset. They adapt to a new window or position until they are edited or keyed.
 
     Args:
         index: Index of the shutter.

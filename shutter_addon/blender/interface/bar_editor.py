@@ -110,7 +110,9 @@ def bar_under(context: Context, x: float, y: float) -> int | None:
 
 
 def _seen(context: Context) -> tuple[Scene, PropertyGroup, Strip, np.ndarray, list[str]] | None:
-    """Return what the bar editor shows; None: no effect is visible, it has no shutter, or its bars are invalid.
+    """Return what the bar editor shows of the active effect.
+
+    None: the preview does not show that effect, it has no active shutter, or the shutter's bars are invalid.
 
     Returns:
         Scene, effect and effect strip, the active shutter's bars (L,), and their key states (bar_edits.key_state).

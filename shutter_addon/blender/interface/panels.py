@@ -210,7 +210,7 @@ def _notes(context: Context) -> Iterator[tuple[str, str]]:
 
 
 def _tracked(effect: PropertyGroup) -> list[int | None]:
-    """Return what may be tracked: the active region's index, and None if the active shutter follows the camera."""
+    """List what may be tracked: the active region's index; None for the camera, if the active shutter follows it."""
     region = [effect.active_region] if selection.active_region(effect) is not None else []
     shutter = selection.active_shutter(effect)
     return region + ([None] if shutter is not None and shutter.follow == "CAMERA" else [])

@@ -232,7 +232,10 @@ def _show_sharp(context: Context, shown: Shown | None) -> None:
 
 
 def _show_strokes(context: Context, quad: Quad, shown: Shown, snapshot: Snapshot) -> None:
-    """Draw the strokes of all visible regions, moved to where their region is at the current frame."""
+    """Draw the strokes and outlines at the current frame (Effect.drawn_at), unless the preview hides overlays.
+
+    Regions whose annotation layer is hidden are left out, except for a subject's *Not This* strokes.
+    """
     if not context.space_data.show_overlays:
         return
     frame = shown.scene.frame_current

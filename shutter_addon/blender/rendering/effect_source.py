@@ -187,7 +187,7 @@ def open_source(snapshot: Snapshot) -> ShotSource:
 def clip_of(snapshot: Snapshot, source: FrameSource) -> Clip:
     """Return the size, length and timing of an effect's footage as plain data.
 
-    The timing is the effect's *Source Time* if that is keyed, otherwise the source strip's.
+    The timing is the effect's *Custom Time* if that is on, otherwise the source strip's.
 
     Args:
         snapshot: The effect.

@@ -88,8 +88,9 @@ def _drop(noted: set[int]) -> None:
 
 
 def invalidate_changed(scene: Scene) -> bool:
-    """Drop cached frames of a scene's effects whose keyframes, strokes or source changed since the last call.
+    """Drop cached frames of a scene's effects that changed since the last call in a way that Blender does not report.
 
+    Such changes are those of keyframes, strokes, mattes and the source, among others (effect_version.preview_key).
     Current values of keyed properties do not count, as they change with every frame that plays.
 
     Returns:

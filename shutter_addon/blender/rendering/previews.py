@@ -44,8 +44,8 @@ class Whole:
     Attributes:
         scene: session_uid of the effect scene.
         frame: Timeline frame.
-        key: The picture's Request.key without its source; if it differs later, the effect has changed. None: not known
-            yet.
+        key: Request.key, without the source, of the picture without moments (frames computed between filmed ones). If
+            it differs later, the effect has changed. None: not known yet.
     """
 
     scene: int
@@ -85,7 +85,7 @@ class Drawing:
         request: The picture to draw, possibly as a draft (previews.draft).
         renderer: Makes the picture.
         left: Width of the part at the left that shows the source, as a fraction of the picture's width.
-        draws_result: Whether the handler draws the result; otherwise Blender shows it.
+        draws_result: Whether the handler draws the result. False: Blender shows it, or it is not shown.
     """
 
     decision: Decision
@@ -136,7 +136,9 @@ looking = _Looking()
 
 
 def for_engine(context: Context, effect_scene: Scene) -> Decision | None:
-    """Return what the engine has to make while Blender draws a preview, and keep it for take_decision.
+    """Return what the engine has to make while Blender draws a preview.
+
+    It is kept for take_decision only if the preview shows this effect at the frame that is made.
 
     Returns:
         The decision. None: the picture is not for a preview, or an operator or tool reads it. It then has full quality.
@@ -325,7 +327,7 @@ def _time_up(context: Context, request: Request) -> Slice:
 
 
 def refine() -> None:
-    """Work for about 0.15 s on pictures with frames computed between filmed ones, which will replace drawn plain ones.
+    """Work for about 0.15 s on each picture with frames computed between filmed ones, which will replace a plain one.
 
     While the pen is down, drop this work; while a slow picture is being made, let it rest.
 

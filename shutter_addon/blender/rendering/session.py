@@ -97,8 +97,7 @@ class RenderContext:
 
     Attributes:
         session: Makes the pictures on its device.
-        say: Called with a sentence for the user when a slower device than wanted is used, or when something cannot be
-            done.
+        say: Called with a sentence for the user when a slower device than wanted is opened.
         levels: Whether pictures have 8-bit sRGB values over black (Request.levels). Otherwise they are scene-linear
             float32.
         display: Converts the finished scene-linear picture to the 8-bit values of Blender's output (Request.display);

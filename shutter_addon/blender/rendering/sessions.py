@@ -102,7 +102,7 @@ def close_if_device_changed() -> None:
 
 
 def end_job() -> None:
-    """Stop making pictures ahead after a render, and forget its requests. Renderers stay open for the next render."""
+    """Forget a render's requests; on a job's thread, also stop making pictures ahead. Renderers stay open."""
     if render_job.where() is Where.JOB:
         SESSIONS.offscreen.rest()
     SESSIONS.offscreen.requests.clear()

@@ -133,7 +133,8 @@ class Texture:
 class Device:
     """A GPU or software renderer with texture arrays and compute passes.
 
-    Call its methods inside `with device.current():`, on one thread at a time, and with textures that it made.
+    Call its methods, except `freeing` and `release`, inside `with device.current():`, on one thread at a time, and with
+    textures that it made.
 
     Attributes:
         name: The renderer's name, as the driver tells it.

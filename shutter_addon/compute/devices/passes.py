@@ -141,7 +141,7 @@ def _declared(program: Pass, line: str) -> str:
 def _live(path: Path, macros: Mapping[str, int | str]) -> Iterator[str]:
     """Yield the lines of a shader file, with conditions and #include resolved for some macros.
 
-    Directives and lines whose conditions do not hold become blank, and included files are inserted. A #line directive
+    Conditions, and lines for which they do not hold, become blank. Included files are inserted. A #line directive
     at the start and after each included file keeps line numbers right in the compiler's errors.
 
     Args:

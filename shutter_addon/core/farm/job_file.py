@@ -33,8 +33,8 @@ class EditVersion:
         colours: The OpenColorIO configuration: the name of one that is built into OpenColorIO, the SHA-256 of another
             one's file, or "" for the one that comes with Blender.
         blend: SHA-256 of the .blend file, hexadecimal.
-        footage: One SHA-256, hexadecimal, for all other files that pictures are made from, in the order in which the
-            .blend file names them. Sounds do not count. Of a large file, only the size and some blocks count.
+        footage: One SHA-256, hexadecimal, for all other files that pictures are made from. Of a large file, only the
+            size and some blocks count.
     """
 
     extension: str

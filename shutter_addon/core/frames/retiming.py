@@ -29,7 +29,7 @@ class StripTiming:
 
     Attributes:
         name: The strip's name.
-        first: How many frames of the footage come before the content: *Frame Offset* of a movie clip, else 0.
+        first: How many frames of the footage come before the content: *Frame Offset* of a clip of a movie, else 0.
         scene_fps: Frames per second of the edit.
         content_start, content_end: The timeline frame of the content's first frame, and one past its last, whether the
             strip's handles hide them or not.

@@ -109,7 +109,7 @@ def _layered(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameS
         at: The shown frame.
 
     Raises:
-        EffectError: The strokes of a layer are too far outside the picture.
+        EffectError: The strokes of a region, which need not be a layer, are too far outside the picture.
     """
     if not (regions := effect.layers_at(at.frame)):
         return state
@@ -162,11 +162,11 @@ def _scribbles(
 
     Args:
         effect: The effect.
-        state: The effect's state at the shown frame, whose options are used.
+        state: The effect's state at the shown frame, whose options are used, except `edge_aware`.
         drawn: (1 + the layer's index, region) for each region of strokes, later ones on top; 0 instead for a region
             that is no layer.
         count: The number of layers, drawn or not.
-        frame: The timeline frame before the source frame is shown.
+        frame: The timeline frame at the source frame's time, or less than one frame before it.
         share: How far the source frame's time is from that frame to the next one, 0 to 1.
     """
     placed = [(number, _between(region, frame, share)) for number, region in drawn]

@@ -44,10 +44,11 @@ class Sample(NamedTuple):
 def counts(combine: Combine, bars: ArrayLike, coefficients: ArrayLike, interpolation: str) -> np.ndarray:
     """Return how much each frame of the window counts at each pixel for lightest, darkest or median: weights (…, L).
 
-    For a median the weights are the interpolated bars, with the sum 1. For lightest and darkest they are 0 to 1, and
-    the frame at a shutter's highest bar has the weight 1. By value interpolation, each shutter's bars are divided by
-    their maximum and averaged by the coefficients. By displacement, each shutter's bars are divided by their sum and
-    interpolated, then multiplied by the mean of sum / maximum over the shutters, weighted by the coefficients.
+    For a median the weights are the interpolated bars, with the sum 1. For lightest and darkest they are 0 to 1; where
+    a pixel gets one shutter alone, the frame at its highest bar has the weight 1. By value interpolation, each
+    shutter's bars are divided by their maximum and averaged by the coefficients. By displacement, each shutter's bars
+    are divided by their sum and interpolated, then multiplied by the mean of sum / maximum over the shutters, weighted
+    by the coefficients.
 
     Args:
         combine: How frames are combined.

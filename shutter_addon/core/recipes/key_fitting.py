@@ -52,10 +52,10 @@ _Fits = Callable[[float, float, float, float], bool]
 def with_keys(effect: Effect, shown: range, contents: Iterable[FileContent | RampContent] = ()) -> Effect:
     """Convert an effect to the form that recipes have: keys instead of values at every frame.
 
-    The keys give the effect's values at whole frames, within TOLERANCE. Regions that consist of strokes but have none
-    are left out, and so are a region's drawings before the first one that has strokes. A shutter that follows a region
-    that is left out follows nothing. Properties that recipes cannot key, such as options, become constant: they have
-    the value at the first frame.
+    The keys give the effect's values at whole frames, within TOLERANCE. Scribbles, outlines and subjects of which
+    nothing is drawn are left out, and so are a region's drawings before the first one that has strokes. A shutter that
+    follows a region that is left out follows nothing. Properties that recipes cannot key, such as options, become
+    constant: they have the value at the first frame.
 
     Args:
         effect: The effect. Its channels are sampled at all frames in `shown`, and at the frames of keys and drawings.

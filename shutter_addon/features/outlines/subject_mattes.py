@@ -79,7 +79,7 @@ class Network:
         """Read a network from an ONNX file.
 
         Raises:
-            MediaError: The file is missing or damaged, or its network does not take one picture.
+            MediaError: The file is missing or damaged, or its network takes no RGB picture of a fixed size.
         """
         self._name = path.name
         try:

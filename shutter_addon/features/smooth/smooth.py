@@ -64,8 +64,8 @@ class Repeats:
         """Return the two frames from which the pictures between a frame and the next one are computed.
 
         Usually these are the frame and the next one. If the frame is one of several equal ones, they are the first of
-        these and the next different frame. More than MOST equal frames count as a still shot: there, and at cuts,
-        frames are not skipped.
+        these and the next different frame. But frames are not skipped before a cut or the end, nor if more than MOST
+        are equal (a still shot), nor if the frames around them change by less than TIMES as much.
 
         Args:
             index: The frame of the source.
@@ -113,12 +113,12 @@ class Repeats:
 class SmoothSource(SourceWrapper):
     """A source with the frames of another source, and between them moments: pictures computed by optical flow.
 
-    Frame i of the other source is at index i · step. Where two frames have nothing in common, as at a cut, a moment
-    between them is the nearer frame.
+    Frame i of the other source is at index i · step, unless it repeats the one before and is skipped. Where two frames
+    have nothing in common, as at a cut, a moment between them is the nearer frame.
 
     Attributes:
         step: Indices from a frame of the other source to the next; step − 1 moments lie in between.
-        repeats: Whether any repeated frame was replaced by a moment so far.
+        repeats: Whether any moment was made across skipped, repeated frames so far.
     """
 
     def __init__(

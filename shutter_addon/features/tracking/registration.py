@@ -372,7 +372,8 @@ def fit(
 def _hypotheses(p: np.ndarray, q: np.ndarray, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
     """Return candidates for a similarity that takes points p to points q (n,), from which `fit` chooses (RANSAC).
 
-    Each is made from one pair of a point and its target (motion "location") or from two.
+    Each is made from two pairs of a point and its target, or from one (motion "location", or if the points lie
+    too close together).
 
     Args:
         motion: What may change, one of MOTIONS.

@@ -137,10 +137,10 @@ def note_tracking(say: Callable[[str], None]) -> None:
 
 
 def _look() -> float | None:
-    """Follow the thread that makes mattes, and redraw previews with its mattes.
+    """Follow the thread that makes mattes, and redraw previews, which tell its progress.
 
-    That happens when the frames with a drawing are done, and when the thread has ended. If it failed, the reason is
-    noted.
+    They get its mattes when the frames with a drawing are done, and when the thread has ended, unless it was stopped.
+    If it failed, the reason is noted.
 
     Returns:
         The seconds after which Blender, of which this is a timer, calls it again; None ends the timer.

@@ -190,6 +190,6 @@ def rest_smooth() -> None:
 
 
 def forget_pictures() -> None:
-    """Wait for threads and forget all unfinished pictures, when a file is loaded or the extension is disabled."""
+    """Wait for threads that find how many moments effects need, and forget all pictures, before devices are freed."""
     wait([coming.steps for coming in _coming.values() if coming.steps is not None])
     _coming.clear()
