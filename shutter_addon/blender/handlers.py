@@ -116,8 +116,8 @@ def _prepare(film: int, in_job: bool) -> bool:
 
     Args:
         film: session_uid of the rendered scene.
-        in_job: Whether a render job in Blender's window renders, in another thread. All effects are then read now,
-            before it starts (job_snapshots).
+        in_job: Whether a job of Blender's window renders, in another thread. The film's effects are then read now
+            (job_snapshots).
 
     Returns:
         True, which tells the waiting thread that it is done.

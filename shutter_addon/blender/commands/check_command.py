@@ -56,7 +56,7 @@ def run(arguments: Namespace) -> None:
 
 
 def _checked(arguments: Namespace, scene: Scene, frames: range) -> tuple[str, list[str], list[str]]:
-    """Choose the render device, and look for everything that would make a render of these frames fail.
+    """Choose the render device, and look for what would make a render of these frames fail.
 
     Args:
         arguments: The parsed options of `check`.

@@ -102,7 +102,8 @@ def make_edit(path: Path, medium: FrameSource, source_recipe: Effect, folder: Pa
     Both strips begin at frame 1. A movie's sound gets a strip, too.
 
     Args:
-        path: The movie, or the first file of the image sequence. The strips are named after it.
+        path: The movie, or the first file of the image sequence. The strips of its picture and sound are named after
+            it.
         medium: The same footage, opened. Size, frame rate and list of files are read from it.
         source_recipe: The effect.
         folder: The recipe's folder. Paths of mattes in the recipe are relative to it.
@@ -151,14 +152,14 @@ def _written(arguments: Namespace, file_format: str, frames: range) -> list[Path
 
 
 def _mattes(source_recipe: Effect, folder: Path) -> list[Path]:
-    """Return the paths of all files of the mattes in a recipe. Open each matte once, to check that it can be read.
+    """Return the paths of all files of the mattes in a recipe. Open each matte, to check that it can be read.
 
     Args:
         source_recipe: The recipe's effect.
         folder: The recipe's folder. Paths of mattes in the recipe are relative to it.
 
     Raises:
-        MediaError: A matte is missing or cannot be read.
+        MediaError: A matte is missing, cannot be read, or lacks the channel.
     """
     files = []
     for content in recipe.contents(source_recipe):

@@ -57,7 +57,7 @@ def migrate() -> None:
 
 
 def stamp_saved(version: str) -> None:
-    """Write the extension's version into all scenes with effects. It is called before a file is saved.
+    """Write the extension's version into all scenes with effects, except linked ones, before a file is saved.
 
     The scenes' data format stays as it is: an effect that was appended from an older file is converted by `migrate`
     when the file is loaded next.

@@ -44,8 +44,8 @@ def frames_of(strip: Strip) -> range:
 def key(scene: Scene, effect: PropertyGroup, strip: Strip, frames: range) -> str:
     """Return a hash of all that an effect's pictures depend on, so that a bake notices when it is out of date.
 
-    The hash covers the settings and the contents of files. It stays the same if strips move on the timeline, or files
-    move on disk.
+    The hash covers the settings and the contents of files. It stays the same if all strips move together on the
+    timeline, or files move on disk.
 
     Args:
         scene: The scene that has the effect.
@@ -100,8 +100,9 @@ def is_changed(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
 def parts(effect: PropertyGroup, strip: Strip, files: Files, start: int | None = None) -> Iterator[Hashable]:
     """Yield what an effect's pictures depend on, apart from the source and properties with an update callback.
 
-    That is: numbers of bars, regions, strokes, mattes, F-curves and the strip's transform. Of keyed properties, the
-    F-curves are yielded but not the current value, which changes with every frame that plays.
+    That is: numbers of bars, regions, strokes, mattes, F-curves, *Time Stretching*, and the strip's transform and
+    mirroring. Of keyed properties, the F-curves are yielded but not the current value, which changes with every frame
+    that plays.
 
     Args:
         effect: The effect.
@@ -145,8 +146,8 @@ def _source(effect: PropertyGroup, source: Strip, files: Files, start: int) -> H
 def _settings(effect: PropertyGroup) -> Iterator[Hashable]:
     """Yield names and values of the properties without F-curves that an effect's pictures depend on.
 
-    Names and colors of the effect's items are left out. Where a property names another item, such as the region that a
-    shutter follows, that item's index is yielded in place of its name.
+    Names and colors of the effect's items are left out. A region that a shutter follows is yielded as its index. If
+    there are subjects, a digest of the file of the network that finds them is yielded, too.
     """
     path, followed = effect.path_from_id(), [region.name for region in effect.regions]
     curves = filter(fcurves.drives, fcurves.curves_under(effect.id_data, path + "."))
@@ -217,7 +218,8 @@ def _strokes(effect: PropertyGroup, region: PropertyGroup, start: int | None) ->
 def _matte(region: PropertyGroup, files: Files, start: int | None) -> Iterator[Hashable]:
     """Yield what a region's matte depends on: its files, the matte strips with their timing, or its mask.
 
-    Properties of the region itself are not included. If the matte is missing, the error message is yielded.
+    Of the properties of the region itself, only the channel of an image is included. If the region has no matte that
+    can be used, the error message is yielded, but nothing for a missing mask.
 
     Args:
         region: A region whose kind is "MATTE".
@@ -256,7 +258,7 @@ def timing(strip: Strip, start: int = 0) -> StripTiming:
 def _stamps(owner: Strip | PropertyGroup) -> Hashable:
     """Return a value that identifies the files of a strip or an image matte, by paths, sizes and modification times.
 
-    If the files cannot be found, the value is the error message.
+    If there are none, or an effect cannot use them, the value is the error message.
 
     Args:
         owner: The strip, or the region that has the matte.
@@ -277,7 +279,7 @@ def _contents(owner: Strip | PropertyGroup) -> Hashable:
         How the files are read, and a digest of each. A missing file has "missing: NAME" in place of the digest.
 
     Raises:
-        EffectError, MediaError: The strip or the region has no files.
+        EffectError, MediaError: The strip or the region has no files, or an effect cannot use them.
     """
     if isinstance(owner, Strip):
         spec = source_media.spec(owner)

@@ -53,7 +53,7 @@ def absolute(owner: ID | Strip, path: str) -> Path:
 
 
 def relative(path: str) -> str:
-    """Return a path relative to the open .blend file, if both lie on the same drive."""
+    """Return a path relative to the open .blend file, or unchanged if they lie on different drives."""
     with suppress(ValueError):
         return bpy.path.relpath(path)
     return path
@@ -110,7 +110,7 @@ def _of_strip(strip: Strip, frames: range) -> Iterator[str]:
 def _of_item(item: ID, check: Callable = check_file) -> Iterator[str]:
     """Yield a sentence for each missing or unreadable file of a data-block.
 
-    Of an image sequence, only the first file is checked.
+    Of an image sequence, only the file whose path Blender stores is checked.
 
     Args:
         item: The data-block.

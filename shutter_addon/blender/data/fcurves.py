@@ -87,16 +87,13 @@ class Curves:
         return [curve for curve in all_curves if curve is not None]
 
     def keys(self, curves: list) -> tuple[tuple[float, Ease], ...]:
-        """Return the frames of all keys of some F-curves, ascending, each with its ease.
+        """Return (timeline frame, ease) of all keys of some F-curves, frames ascending.
 
         The ease is the interpolation up to the next key: "constant", "linear" or "bezier". If several curves have a key
         on the same frame, the first curve in the list decides.
 
         Args:
             curves: F-curves that `find` or `of` returned.
-
-        Returns:
-            For each key, its timeline frame and its ease.
         """
         eases: dict[float, Ease] = {}
         for curve in curves:
@@ -165,7 +162,8 @@ def set_keys(scene, path: str, index: int, keys: Sequence[tuple[float, float, Ea
         scene: The scene that has the property.
         path: Data path of the property from the scene.
         index: Component of a vector; 0 for a single number.
-        keys: For each key its timeline frame, its value, and the ease: the interpolation up to the next key.
+        keys: For each key, at least one, by ascending frames: its timeline frame, its value, and the ease, which is
+            the interpolation up to the next key.
         group: Name of the channel group that Blender's animation editors show it in; "": in none.
     """
     pace = stretched(scene)

@@ -43,7 +43,7 @@ def content(sampling: Sampling, region: PropertyGroup, moves: Moves) -> Channel:
         source's own luminance.
 
     Raises:
-        EffectError, MediaError: The region has no matte, or its files cannot be found.
+        EffectError, MediaError: The region has no matte, or one that cannot be used.
     """
     if region.kind == "RAMP":
         ramp = validation.word(region, "ramp")
@@ -76,7 +76,7 @@ def tracked(sampling: Sampling) -> dict[str, Any]:
         temporary folder if that was never saved.
 
     Raises:
-        EffectError, MediaError: The effect has no source strip, or its files cannot be found.
+        EffectError, MediaError: The effect has no source strip, or one that cannot be used.
     """
     beside = Path(bpy.data.filepath).parent if bpy.data.filepath else Path(bpy.app.tempdir)  # which Blender clears
     return {"footage": source_media.spec(_source(sampling)), "folder": beside / MATTES}
@@ -117,8 +117,11 @@ def image_path(region: PropertyGroup) -> Path:
 def image_file(region: PropertyGroup) -> MatteFile:
     """Return a region's image matte as MatteFile: its path, its channel, and a stamp that changes when a file changes.
 
+    If a later file of an image sequence is overwritten, the stamp changes only after source_media.look_again.
+
     Raises:
-        EffectError, MediaError: The region has no image that is a file on disk.
+        EffectError: The region has no image with a file, or its channel has no name.
+        MediaError: The first file of an image sequence is missing, or its folder cannot be listed.
     """
     path = image_path(region)
     is_sequence = region.image.source == "SEQUENCE"
@@ -185,7 +188,7 @@ def _of_strip(strip: Strip, word: str) -> MatteFile:
         word: The channel that is the matte, as in `channel`.
 
     Raises:
-        MediaError: The strip has no files.
+        MediaError: The strip has no files, or is a clip strip that is undistorted or stabilized.
     """
     spec = source_media.spec(strip)
     return MatteFile(path=spec.path, channel=word, files=spec.files, stream=spec.options["stream"], stamp=spec.key)
@@ -197,7 +200,7 @@ def strip_name(region: PropertyGroup) -> str:
 
 
 def choose_strip(region: PropertyGroup, name: str) -> None:
-    """Make the strip with this name a region's matte, and with it the other parts if it was cut.
+    """Make the strip with this name a region's matte, with the other parts if it was cut since it first was a matte.
 
     A region stores an identity, which its matte strips have, too. Copies of the strip get no part in it. If there is no
     such strip, the region has no matte strip any more.

@@ -89,7 +89,7 @@ def preview_region(area: Area) -> bpy.types.Region:
 
 
 def shown(context: Context, channel: int = 0) -> Shown | None:
-    """Return the effect strip that the context's preview shows at the playhead; None: there is none.
+    """Return the effect strip that the context's preview shows at the playhead.
 
     Args:
         context: A context of a sequencer area with a preview.
@@ -120,8 +120,8 @@ def look(context: Context, scene: Scene, effect: PropertyGroup, strip: Strip) ->
         strip: The effect strip.
 
     Returns:
-        Scale and proxy of the largest preview, and whether all previews show the picture unchanged: without blending,
-        modifiers, or view settings that alter it.
+        Scale and proxy of the largest preview, and whether all previews show the picture unchanged, without blending,
+        modifiers, or settings of display or overlay that alter it.
     """
     areas = list(_areas_of(context, scene))
     scales = {area.spaces.active: _scale(context, scene, strip, area) for area in areas}

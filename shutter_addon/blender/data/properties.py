@@ -37,9 +37,9 @@ _FAR, _TURN = {"min": -MAX_DISTANCE, "max": MAX_DISTANCE}, math.radians(MAX_DEGR
 
 
 def with_fields(*kinds: type, **more: dict) -> Callable[[type], type]:
-    """Return a class decorator that gives a Blender class a property for each field of some dataclasses.
+    """Return a class decorator that gives a Blender class the properties that fields of some dataclasses declare.
 
-    Each Blender property takes its name, label, range and default from the dataclass's field.
+    Each Blender property takes its name, label, range and default from its field. Other fields are left out.
 
     Args:
         kinds: Dataclasses of the model, such as core.model.effect.Shutter.
@@ -59,8 +59,8 @@ def _property(field: Field, **more: Any) -> object:
 
     Args:
         field: Describes the field.
-        more: Further arguments of the Blender property, which replace those made from the field. Without an `update`,
-            a change calls consistency.changed; but a change of a text calls nothing.
+        more: Further arguments of the Blender property. Without an `update`, a change calls consistency.changed; but a
+            change of a text calls nothing.
     """
     kind, default = type(field.default), field.default
     said: dict = {"name": field.label, "description": field.description, "translation_context": field.context}
@@ -265,7 +265,7 @@ class Shutter(PropertyGroup):
 
 @with_fields(model.Effect, Options, window={"update": _window_changed}, position={"update": _window_changed})
 class _Settings:
-    """All properties of an effect but its shutters and regions.
+    """The properties of an effect that come before its shutters and regions (ShutterEffect).
 
     Blender lists the properties of a base class first. So code that copies an effect's properties in order sets the
     window before the shutters' bars, and changing the window does not resample them.

@@ -25,7 +25,7 @@ _KINDS = {model.MatteRegion: "MATTE", model.OutlineRegion: "OUTLINE", model.Subj
 
 
 def apply(scene, effect, strip, source: model.Effect, folder: Path = Path()) -> None:
-    """Replace the settings, regions, strokes and keys of an effect by those of a recipe.
+    """Replace the settings, shutters, regions, strokes and keys of an effect by those of a recipe.
 
     Args:
         scene: The scene that has the effect.
@@ -63,7 +63,8 @@ def _set_fields(owner, path: str, part: Any, first: float, **curve) -> None:
     Args:
         owner: The property group.
         path: Data path of `owner` from the scene.
-        part: A part of the recipe, such as a model.Shutter. `owner` has a property for each of its fields.
+        part: A part of the recipe, such as a model.Shutter. `owner` has a property for each of its declared fields
+            (fields_of).
         first: Timeline frame before the effect strip's first one. Adding it to a recipe's frame gives the timeline
             frame.
         curve: Further arguments of fcurves.set_keys, such as `group`.
@@ -79,7 +80,7 @@ def _set_fields(owner, path: str, part: Any, first: float, **curve) -> None:
 def _set_channel(owner, path: str, name: str, source: Channel, first: float, change: Callable = float, **curve) -> None:
     """Set a number or a vector of a property group, with F-curves if the recipe has keys for it.
 
-    Without keys the property gets the constant value; with keys, also the value of the first key.
+    The property's own value becomes the constant one or, with keys, that of the first key.
 
     Args:
         owner, path, first, curve: As in _set_fields.
@@ -113,14 +114,14 @@ def _set_keys(owner, path: str, index: int, keys: keyframes.Keys, values: Iterab
 
 
 def matte_image(path: str | Path, channel: str = "luminance"):
-    """Load a movie, image sequence or picture as an image data-block, and return that. It serves a region as matte.
+    """Return a movie, image sequence or picture as an image data-block for a matte. Load it if needed.
 
     Args:
         path: The file, or the first file of an image sequence.
         channel: The channel that the matte will use, in the words of recipes. The file must have it.
 
     Raises:
-        MediaError: There is no such file, or it lacks the channel.
+        MediaError: The file is missing, cannot be read, or lacks the channel.
     """
     with MatteFile(path=Path(path), channel=channel).open() as matte:
         found, count = Path(matte.path), matte.count

@@ -12,11 +12,13 @@ from .strips import ENGINE, all_strips, own_strips
 
 
 def left_out(scene: Scene) -> list[tuple[range, str]]:
-    """Return the effect strips that Blender would leave out of the picture without an error, because of some setting.
+    """Return the effect strips that Blender would leave out of the picture without an error.
+
+    It does so if the effect scene is gone, has no camera, or does not have the settings that it needs (`settings`).
 
     Returns:
-        For each such strip: the timeline frames at which it lies and is not muted, and the reason, as a sentence for
-        the user. Strips that are always muted are not listed.
+        For each such strip: the timeline frames at which it lies, and the reason, as a sentence for the user. Muted
+        strips, and those in muted channels or meta strips, are not listed.
     """
     reasons = ((shown_frames(scene, strip), why) for strip in own_strips(scene) if (why := _why(strip)) is not None)
     return [(frames, why) for frames, why in reasons if frames]
@@ -61,7 +63,7 @@ def camera(strip: Strip) -> Object | None:
 
 
 def shown_scenes(film: Scene, frames: range | None = None) -> dict[Scene, range]:
-    """Return the scenes whose strips a rendered scene shows: itself, and those of its Scene strips, nested ones too.
+    """Return the scenes whose strips a rendered scene may show: itself, and those of its Scene strips, nested ones too.
 
     Scenes without a sequencer are left out.
 

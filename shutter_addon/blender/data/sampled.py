@@ -107,7 +107,8 @@ class Sampling:
     def channel(self, owner: PropertyGroup, path: str, name: str, change: Callable = lambda value: value) -> Channel:
         """Return the values of a float property or vector over time, as a channel.
 
-        A value out of the property's range is an EffectError, which the channel raises when that value is asked for.
+        Values of F-curves are clamped to the property's range. A stored value out of range, or NaN, is an EffectError,
+        which the channel raises when that value is asked for.
 
         Args:
             owner: The struct that has the property.

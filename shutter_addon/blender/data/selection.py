@@ -61,7 +61,8 @@ def in_picture(context: Context) -> Any:
 def seen(scene: Scene) -> Any:
     """Return (scene, effect, effect strip) that previews of a scene show at the playhead; None: no effect is there.
 
-    Of several effect strips, take the active one, else one whose source is the active strip, else the highest channel.
+    Of several effect strips, take the active one, else one whose effect the active strip shows or is the source of,
+    else the highest channel.
     """
     scene_strips = [strip for strip in visible(scene) if strip.type == "SCENE" and strip.scene]
     shown = [(strip, effect) for strip in scene_strips if (effect := effect_of(scene, strip.scene))]
@@ -76,7 +77,7 @@ def seen(scene: Scene) -> Any:
 def visible(scene: Scene) -> list:
     """Return the strips at the playhead that have a picture and are not muted, nor their channel.
 
-    If a meta strip is open, these are strips inside it only.
+    These are the strips directly in the open meta strip or, if none is open, those in no meta strip.
     """
     editor, frame = scene and scene.sequence_editor, scene and scene.frame_current
     if not editor:
@@ -108,7 +109,9 @@ def _effects_of(scene: Scene, strip: Strip | None) -> list:
 
 
 def _baked_part(scene: Scene, strip: Strip) -> Any:
-    """Return (scene, effect, effect strip) of the bake that a strip belongs to; None: the strip is no part of a bake.
+    """Return (scene, effect, effect strip) of the bake that a strip belongs to.
+
+    None: the strip is no part of a bake, or the bake has no effect strip any more.
 
     A bake consists of the effect strip and the baked strip that replaces it. Copies of them share the bake's identity.
     Of several effect strips, `strip` itself comes first, then one that overlaps it in time, then any.
@@ -140,10 +143,7 @@ def effect_of_item(item: PropertyGroup) -> PropertyGroup:
 
 
 def moving(effect: PropertyGroup, index: int | None) -> PropertyGroup:
-    """Return what moves: the effect's region with this index or, for None, its camera.
-
-    Both have the same properties of motion (location, rotation, scale), so functions that work on either take an index.
-    """
+    """Return the effect's region with this index or, for None, its camera. Both have location, rotation and scale."""
     return effect.camera if index is None else effect.regions[index]
 
 
@@ -189,8 +189,8 @@ class Target:
         """Return the effect that has the target, looked up in Blender's data.
 
         Returns:
-            None if the effect was removed or moved in time, if undo or loading replaced Blender's data, or if another
-            region has the index now.
+            None if the effect was removed or moved in time, if undo or loading replaced Blender's data, or if
+            no region, or one with another annotation layer, has the index now.
         """
         effects = (effect for scene in bpy.data.scenes for effect in scene.virtual_shutter.effects if effect.scene)
         effect = next((effect for effect in effects if effect.scene.session_uid == self.scene), None)

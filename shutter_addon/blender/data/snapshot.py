@@ -103,7 +103,8 @@ def read(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames) -> m
         frames: Timeline frames for which the effect will be asked.
 
     Raises:
-        EffectError, MediaError: It has no shutter, too many shutters or regions, or a matte without content.
+        EffectError, MediaError: It cannot be shown at any frame: for example, it has no shutter, too many regions, or a
+            matte without content.
     """
     check_counts(effect)
     layers = any(region.is_layer for region in effect.regions)
@@ -246,7 +247,7 @@ def carried_outline(
         (from 0) of the frame of the footage that is shown there.
 
     Raises:
-        EffectError, MediaError: The outline is not tracked (*Linear*), or the effect has no source.
+        EffectError, MediaError: The outline is not tracked (*Linear*), or there is no source that can be read.
     """
     sampling = Sampling.of(scene, effect, strip, frames)
     _curves, file = _drawn(sampling, index)
@@ -263,7 +264,7 @@ def source_frames(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Fra
         By timeline frame, the number of the frame of the footage, from 0.
 
     Raises:
-        EffectError, MediaError: The effect has no source strip, or its movie cannot be read.
+        EffectError, MediaError: The effect has no source strip, or that has no files or an unreadable movie.
     """
     return matte_content.filmed_frames(Sampling.of(scene, effect, strip, frames))
 
@@ -451,12 +452,12 @@ def _drawn(sampling: Sampling, index: int) -> tuple[dict[str, Any], Any]:
 
 
 def _by_source_frame(sampling: Sampling, drawings: model.Drawings) -> dict[int, outlines.Curves]:
-    """Return drawn curves by the frame of the footage, from 0, that was shown where they were drawn.
+    """Return drawn curves by the frame of the footage, from 0, that the source shows at the timeline frame of each.
 
     The curves are in fractions of the picture. If two drawings lie on the same frame of the footage, the later counts.
 
     Raises:
-        EffectError, MediaError: There is no source.
+        EffectError, MediaError: There is no source, or its files cannot be read.
     """
     there = replace(sampling, frames=drawings.frames)
     placed = replace(drawings, placement=there.placement)
@@ -497,7 +498,8 @@ def recipe_of(scene: Scene, effect: PropertyGroup, strip: Strip, contents: Seque
         contents: What mattes are in the recipe: one for each matte and ramp that is kept, in the order of the regions.
 
     Raises:
-        EffectError: The effect cannot be rendered as it is.
+        EffectError, MediaError: The effect cannot be rendered as it is, the strip or a key lies beyond the timeline, or
+            the strip is too small to place its strokes.
     """
     check_counts(effect)
     shown, keyed = range(strip.left_handle, strip.right_handle), _keyed(scene, effect)

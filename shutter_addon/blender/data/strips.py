@@ -141,13 +141,7 @@ def source_of(scene: Scene, effect: PropertyGroup, strip: Strip) -> Strip:
 
 
 class Shown(NamedTuple):
-    """An effect strip, with the effect that it shows and its source.
-
-    Attributes:
-        effect: The effect.
-        strip: The effect strip.
-        source: The source strip; None: it is missing.
-    """
+    """An effect, an effect strip that shows it, and that strip's source (None: it is missing)."""
 
     effect: PropertyGroup
     strip: Strip
@@ -186,6 +180,8 @@ def identified(scene: Scene, name: str, identity: str) -> list:
 
 def invalidate(scene: Scene, effect_scene: Scene | None = None) -> None:
     """Drop the pictures of a scene's effect strips that Blender's sequencer caches, so that they are made again.
+
+    It also counts as a change of the edit (core.revision).
 
     Args:
         scene: The scene that has the strips.

@@ -47,7 +47,8 @@ def of_edit(scene: Scene) -> EditVersion:
     """Return what identifies the version of the open edit, for comparing edits on several machines.
 
     It has the versions of the extension and of Blender, the color configuration (`colours`), and hashes of the .blend
-    file and of all other files that its pictures are made from. A missing file counts by its name.
+    file and of all other files that its pictures are made from. A missing or unreadable file counts by its
+    name.
 
     Raises:
         OSError: The .blend file was never saved, or is gone.

@@ -36,7 +36,8 @@ def choose(wanted: str, *, window_waits: bool = False) -> tuple[str, str | None]
         window_waits: Whether Blender's window is blocked until the picture is made. Then Blender's GPU cannot be used.
 
     Returns:
-        The device as a key of OPEN. And a sentence for the user that says why "auto" did not find OpenGL; else None.
+        The device as a key of OPEN. And, if "auto" cannot take OpenGL, a sentence for the user that says why,
+        and what it takes instead; else None.
 
     Raises:
         NoDeviceError: The wanted device cannot be used.

@@ -287,8 +287,8 @@ def _buffer(kind: str, array: np.ndarray) -> gpu.types.Buffer:
     """Return a buffer of the `gpu` module that shares the memory of a contiguous array.
 
     Args:
-        kind: Type of the array's numbers, "FLOAT" or "UINT".
-        array: The array.
+        kind: "FLOAT" or "UINT".
+        array: The array, of float32 or uint32.
     """
     return gpu.types.Buffer(kind, array.size, array.reshape(-1))
 

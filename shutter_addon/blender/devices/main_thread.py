@@ -43,7 +43,7 @@ class _MainThread:
             another thread, even while Blender draws, when no Blender data may change.
         timers: Timers to remove when the extension is disabled.
         until: Time until which more calls are expected, so that the main thread looks for them without a pause.
-        looked: Time at which the main thread last finished making calls.
+        looked: Time at which `look` last finished making calls.
         unfinished: Number of calls made since the main thread last waited for the GPU.
         batch: Value of `unfinished` at which the main thread waits for the GPU.
     """
@@ -170,7 +170,7 @@ def serve(seconds: float = _LEAST) -> bool:
     """Make calls of other threads on the main thread, such as while it waits for the result of one of these threads.
 
     Args:
-        seconds: The most time to spend. It ends earlier if no call comes for _GAP seconds.
+        seconds: Time after which no further call is begun. It ends earlier if no call comes for _GAP seconds.
 
     Returns:
         False if calls wait but cannot be made, because Blender's GPU cannot be used yet.

@@ -38,7 +38,7 @@ def add_effect(scene: Scene, source: Strip) -> tuple[Strip, PropertyGroup]:
         source: The movie, image or clip strip.
 
     Returns:
-        The new effect strip, which lies above the source and has its range, transform and crop; and the new effect.
+        The new effect strip, above the source and with its range and look (LOOK); and the new effect.
 
     Raises:
         MediaError: The source's footage cannot be read.

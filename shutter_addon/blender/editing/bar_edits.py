@@ -156,8 +156,8 @@ def key_state(effect: PropertyGroup, index: int) -> list[str]:
         index: Index of the shutter.
 
     Returns:
-        A word for each bar: "" (it has no F-curve), "changed" (its stored weight differs from its F-curve, because it
-        was edited and not keyed yet), "keyed" (it has a keyframe at this frame) or "animated" (it has none here).
+        A word for each bar: "" (no F-curve determines it), "changed" (its stored weight differs from its F-curve,
+        because it was edited and not keyed yet), "keyed" (it has a keyframe at this frame) or "animated" (none here).
     """
     scene = effect.id_data
     curves = fcurves.Curves(scene)
@@ -184,7 +184,7 @@ def bars_now(effect: PropertyGroup, index: int) -> np.ndarray:
         index: Index of the shutter.
 
     Raises:
-        EffectError: A bar is out of range, or the number of bars is not the window's length.
+        EffectError: A bar or an option of the effect is out of range, or the number of bars is not the window's length.
     """
     return _read(effect, index)[0]
 

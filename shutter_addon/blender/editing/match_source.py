@@ -120,8 +120,8 @@ def _goal(effect: PropertyGroup, strip: Strip, source: Strip) -> tuple[int, int,
     """Return the left and right handle that `match` would give an effect strip, and a strip that is in the way.
 
     The range is that of the source. If the source was cut, it is that of all its parts which share frames with the
-    strip. A handle stays where it is if another effect strip with the same source reaches farther on that side.
-    Neighbors in the same channel limit the range. If they leave no frame, both handles stay.
+    strip. A handle stays where it is if another effect strip of the source, or of one of these parts, reaches farther
+    on that side. Neighbors in the same channel limit the range. If they leave no frame, both handles stay.
 
     Returns:
         Left handle; right handle; the neighbor before or, if that is not in the way, after the strip; None: none is.
@@ -148,8 +148,8 @@ def _slip(scene: Scene, strip: Strip, source: Strip, left: int, right: int) -> N
     """Move the content of an effect strip, within its handles, to where its source's content begins, if necessary.
 
     It is necessary if the source was moved as a whole: content and handles by the same number of frames. It also is if
-    the strip would otherwise begin before its content, and repeat the content's first frame until there. The effect's
-    keyframes and drawings follow at the next update (reconcile).
+    the source's content begins earlier, and the strip would otherwise begin before its own and repeat the first frame
+    until there. The effect's keyframes and drawings follow at the next update (reconcile).
 
     Args:
         scene: The scene with both strips.

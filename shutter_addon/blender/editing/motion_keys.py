@@ -138,7 +138,7 @@ class MotionKeys:
         _replace(self._curve("confidence", new=True), every, every)
 
     def needed(self, shape: Region | Camera, start: int, placements: Placements, kept: Collection[int]) -> list[int]:
-        """Return the frames, as few as possible, whose keyframes reproduce a tracked motion by interpolation.
+        """Return a few frames whose keyframes suffice to reproduce a tracked motion by interpolation.
 
         The region may be off by up to 1 pixel of the picture, the camera by up to _STEADY pixels. The first and the
         last frame always need a keyframe.
@@ -148,7 +148,7 @@ class MotionKeys:
                 for the camera, at the picture's corners.
             start: Timeline frame at which the region's strokes are taken.
             placements: The tracked motion: the placement at each timeline frame.
-            kept: Frames to return in any case.
+            kept: Frames to return in any case, if they have a placement.
         """
         size = annotations.picture_size(self.effect)
         if isinstance(shape, Camera):

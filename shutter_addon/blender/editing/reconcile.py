@@ -236,7 +236,7 @@ def _duplicate(effect: PropertyGroup, strip: Strip, effect_scene: Scene) -> None
 
 
 def _remove_effects(scene: Scene) -> None:
-    """Remove effects of a scene that no strip shows any more. Keep their data in memory for undelete.restore."""
+    """Remove effects of a scene that none of its strips shows any more. Keep their data for undelete.restore."""
     group, shown = scene.virtual_shutter, {strip.scene for strip in strips.effect_strips(scene)}
     gone = [i for i, effect in enumerate(group.effects) if effect.scene not in shown]
     if gone:
@@ -360,9 +360,9 @@ def _is_baked_over(source: Strip) -> bool:
 def _follow_names(shown: list[strips.Shown]) -> None:
     """Enter the new name of a renamed annotation layer in the regions that use it, then store the layers' names.
 
-    An effect stores the names of its annotation's layers as of the last call. A layer counts as renamed if exactly one
-    name differs and none was added or removed. The names are stored in the effect, and not in the annotation, so that
-    undo restores them together with the regions.
+    An effect stores the names of its annotation's layers as of the last call. A layer counts as renamed if there are as
+    many names as before and exactly one differs. They are stored in the effect, and not in the annotation, so that undo
+    restores them together with the regions.
     """
     for effect, _strip, _source in shown:
         annotation = effect.scene.annotation
@@ -394,7 +394,11 @@ def _remove_scenes(updated: Scene | None) -> None:
 
 
 def _remove_left() -> None:
-    """Remove annotations and cameras of removed effects. Mark those that something else uses as the user's own."""
+    """Remove cameras that no effect scene uses, and annotations of removed effects, if they were made for effects.
+
+    Those that something else uses are marked as the user's own instead, as are annotations that an existing effect no
+    longer uses.
+    """
     scenes = _effect_scenes()
     used = {scene.annotation for scene in scenes} | {scene.camera.data for scene in scenes if scene.camera}
     identities = {scene.virtual_shutter.identity for scene in bpy.data.scenes}
@@ -412,11 +416,11 @@ def _remove_left() -> None:
 
 
 def follow_sources(shown: list[strips.Shown]) -> None:
-    """Update effect scenes: frame rate and stereo views from the edit, size and color mixing from the source's footage.
+    """Give effect scenes the edit's frame rate and stereo setting, and the size of the source's footage.
 
-    If the size changes, strokes stay in place on the picture. Color mixing is how Blender blends pixels where it scales
-    or turns an effect strip: as display values or as light, whichever it does for the source. Footage that cannot be
-    read leaves size and color mixing as they are.
+    If the size changes, strokes stay in place on the picture. Also set a factor in the colors of an effect strip, so
+    that where Blender scales or turns the strip, it blends display values or light as it does for the source. Footage
+    that cannot be read changes neither size nor factor.
 
     Args:
         shown: The effects with their strips and sources.

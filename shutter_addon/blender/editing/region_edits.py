@@ -51,9 +51,11 @@ def add_region(
 def first_drawn(effect: PropertyGroup, shutter: PropertyGroup, kind: str) -> PropertyGroup:
     """Return a region for new strokes: the active one if it is empty and uses the shutter, otherwise a new one.
 
+    A matte or ramp, which has no strokes, does not count as empty.
+
     An effect's first scribble usually marks a subject, if its shutter is sharp (at most one open frame). Then turn
-    *Follow Edges* on, and let the region become a subject if one is found under its first stroke. Do neither if the
-    user has set *Follow Edges*.
+    *Follow Edges* on, and let the region, if it is a line, become a subject if one is found under its first stroke. Do
+    neither if the user has set *Follow Edges*.
 
     Args:
         shutter: The shutter that exposes the region.
@@ -108,7 +110,7 @@ def draw_curves(
         frame: The timeline frame.
 
     Raises:
-        EffectError: The strip has a scale of 0.
+        EffectError: The strip has a scale of 0, or its transform is not finite.
     """
     to_image = annotations.picture_to_image(strip, annotations.picture_size(effect))
     if not annotations.is_invertible(to_image):
@@ -142,7 +144,9 @@ def remove_region(effect: PropertyGroup, index: int) -> None:
 
 
 def move(effect: PropertyGroup, kind: str, index: int, to: int) -> None:
-    """Move a shutter or a region in its list. The first shutter is the default, and later regions cover earlier ones.
+    """Move a shutter or a region in its list, and make it active.
+
+    The first shutter is the default, and later regions cover earlier ones.
 
     Args:
         kind: "shutter" or "region".
@@ -154,7 +158,7 @@ def move(effect: PropertyGroup, kind: str, index: int, to: int) -> None:
 
 
 def assign_region(effect: PropertyGroup, index: int, shutter: PropertyGroup) -> None:
-    """Make the region with this index use another shutter, and make both active."""
+    """Make the region with this index use another shutter and its color, and make both active."""
     effect.regions[index].shutter = shutter.name
     color_layers(effect, shutter)
     effect.active_region = index

@@ -83,9 +83,7 @@ def _free_color(effect: PropertyGroup) -> tuple[float, float, float]:
 
 
 def duplicate_shutter(effect: PropertyGroup, index: int) -> PropertyGroup:
-    """Add a copy of a shutter, with its keyframes, right after it, and return the copy.
-
-    Regions stay with the original.
+    """Add a copy of a shutter, with its keyframes but no regions, right after it. Make it active and return it.
 
     Args:
         index: Index of the shutter.
@@ -112,10 +110,10 @@ def add_time_map(effect: PropertyGroup, ramp: str) -> PropertyGroup:
     """Add a shutter for the window's first frame, one for its last, and a ramp region between them. Return the region.
 
     The picture then shows the first frame where the ramp begins, later frames along it, and the last frame where it
-    ends, as with a rolling shutter. For this, set the effect's interpolation to "DISPLACEMENT".
+    ends, as with a rolling shutter. For this, the effect's interpolation becomes "DISPLACEMENT".
 
     Args:
-        ramp: The ramp's direction or kind, an item of choices.RAMPS.
+        ramp: The ramp's kind, an item of choices.RAMPS.
 
     Raises:
         EffectError: The window's length is out of range. Nothing has changed.
@@ -136,7 +134,7 @@ def ramp_between(
         first: Name and preset (a key of shutters.PRESETS) of the first shutter.
         last: Name and preset of the second shutter.
         name: Name of the region.
-        ramp: The ramp's direction or kind, an item of choices.RAMPS.
+        ramp: The ramp's kind, an item of choices.RAMPS.
 
     Raises:
         EffectError: The window's length is out of range. Nothing has changed.

@@ -24,7 +24,7 @@ _effects: RecentValues[str, dict] = RecentValues()
 def keep(effect: PropertyGroup) -> None:
     """Keep in memory an effect that is about to be removed: properties, F-curves and annotation.
 
-    `restore` makes it again by the identity (unique text) of its effect scene. Without an identity, keep nothing.
+    `restore` makes it again by the identity (unique text) of its effect scene. Without that, keep nothing.
     """
     if effect.scene is not None and effect.scene.virtual_shutter.identity:
         _keep(effect.scene.virtual_shutter.identity, effect)

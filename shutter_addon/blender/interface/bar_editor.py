@@ -30,7 +30,7 @@ class Layout:
         frame: Box around the whole editor: left, bottom, right, top.
         box: Box around the bars, below the header: left, bottom, right, top.
         count: Number of bars.
-        top: Weight at the upper edge of `box`; a bar with weight 0 has no height.
+        top: Weight at the upper edge of `box`; at the lower edge it is 0.
     """
 
     frame: tuple[float, float, float, float]

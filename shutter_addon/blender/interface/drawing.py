@@ -149,7 +149,7 @@ def lines(points: ArrayLike, color: Sequence[float], closed: bool = False, width
 
 
 def text(x: float, y: float, words: str, until: float | None = None) -> None:
-    """Draw a line of text, with its lower left corner at (x, y).
+    """Draw a line of text, whose baseline begins at (x, y).
 
     Args:
         until: x at which the text is cut off; None: nowhere.

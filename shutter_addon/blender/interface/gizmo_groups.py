@@ -49,13 +49,13 @@ class Dragged(Mixin):
 
 
 class InPreview(Mixin):
-    """A gizmo group that shows one gizmo in previews with an effect, while the live preview is on.
+    """A gizmo group in previews. By default it shows one gizmo where an effect is seen, while the live preview is on.
 
-    Subclasses also have `is_wanted(live)`, unless they replace `poll`: it tells whether to show the gizmo by the
-    settings of the live preview (ShutterPreview).
+    Subclasses have `is_wanted(live)`, which tells whether to show it by the settings of the live preview
+    (ShutterPreview), or replace `poll`.
 
     Attributes:
-        gizmo: The gizmo's class.
+        gizmo: The gizmo's class, unless a subclass replaces `setup`.
     """
 
     bl_space_type = "SEQUENCE_EDITOR"

@@ -98,7 +98,7 @@ class Named(Mixin):
         return None
 
     def tried(self, step: Callable[..., set[str] | None], *arguments: object) -> set[str]:
-        """Call a step of the operator, and show errors that the user can cause (FAULTS, UserError). Others are raised.
+        """Call a step of the operator, and show expected errors (FAULTS, UserError). Others are raised.
 
         Args:
             step: The function to call.
@@ -188,14 +188,15 @@ class Beside(Named):
 
     Subclasses have these methods; `tried` shows errors of `begin` and `end`:
 
-    - `begin(context, waits)` does all the work if `waits`, and otherwise prepares it and returns `go_on(context)`.
+    - `begin(context, waits)` does all the work if `waits`. Otherwise it prepares the work and returns
+      `go_on(context)`, unless nothing is left to do.
     - `goes_on(context)` does a step, and returns whether there are more.
     - `end(context, is_stopped)` is called after the last step or, with `is_stopped`, after the user has pressed Esc.
 
     Attributes:
         tick: Seconds between steps.
         blocks: Whether Blender ignores other input between the steps.
-        timers: Timers of all running operators of this kind.
+        timers: Timers of all running operators of all subclasses.
     """
 
     tick = 0.1
@@ -235,7 +236,7 @@ class Beside(Named):
         return self.tried(self.end, context, is_stopped)
 
     def cancel(self, context: Context) -> None:
-        """Stop the operator. Blender calls this when it closes the operator's window."""
+        """Stop the operator. Blender calls this when it ends the operator, such as when its window is closed."""
         self.leave(context)
 
 

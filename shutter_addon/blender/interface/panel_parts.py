@@ -26,7 +26,7 @@ _LIGHT = (0.8, 0.8, 0.8)
 
 
 def sentence(layout: UILayout, words: str, icon: str = "NONE", room: float = 1.0, is_quiet: bool = False) -> None:
-    """Draw a translated sentence, broken into as many lines as the panel's width needs.
+    """Draw a translated sentence, broken into lines that fit the panel's width, but are at most WIDEST wide.
 
     Args:
         words: The sentence.
@@ -50,8 +50,8 @@ def draw_list(layout: UILayout, effect: PropertyGroup, kind: str, count: int) ->
 
     Args:
         kind: "shutter" or "region".
-        count: Number of items that the list shows, which determines its height. Regions of inactive shutters are
-            hidden.
+        count: Number of items that the list shows (regions of inactive shutters are hidden). It determines the height,
+            and whether regions have buttons to move them.
     """
     row = layout.row()
     rows = min(max(count, 1), _MOST_ROWS)

@@ -47,7 +47,7 @@ def _view_chosen(_settings: PropertyGroup, context: Context) -> None:
 
 
 def _redraw_when_still() -> float | None:
-    """Redraw previews once scrubbing or tracking has ended, since Blender does not. This is a timer of Blender."""
+    """Redraw previews once playing, scrubbing or tracking has ended, since Blender does not. A timer of Blender."""
     if previews.is_going(bpy.context):
         return _SOON
     preview_areas.redraw()
@@ -82,8 +82,8 @@ class ShutterPreview(PropertyGroup):
 def _draw() -> None:
     """Draw the effect's picture, strokes and notes over the sequencer's own picture in a preview.
 
-    This is a draw handler, which Blender calls whenever it has drawn a preview. As Blender does not report new strokes,
-    also look for them here, and have changed effects drawn again. Gizmos draw themselves.
+    This is a draw handler, which Blender calls when it has drawn its own picture. As Blender does not report new
+    strokes, also look for them here, and have changed effects drawn again. Gizmos draw themselves.
     """
     context = bpy.context
     blender_gpu.free_unused()
@@ -137,8 +137,7 @@ def _show(context: Context, shown: Shown, decision: Decision | None, say: Say) -
     Args:
         context: The context of the preview.
         shown: The effect strip that the preview shows.
-        decision: What previews.for_engine decided in this redraw, when Blender asked the extension's render engine for
-            the picture. None: Blender did not ask it; the decision is made here.
+        decision: What previews.for_engine has decided for this effect in this redraw; None: decide here.
         say: Adds a note.
     """
     try:
@@ -275,7 +274,7 @@ def _show_shares(
     Args:
         step: The view, and the pass of shaders/show.glsl that draws it: "SCRIBBLES" (which shutter's strokes cover a
             pixel), "COEFFICIENTS" (the pixel's share of each shutter) or "EDGES" (lines around areas where a shutter
-            has more than half).
+            other than the first has more than half).
         colors: The color of each shutter.
         drawn: The texture with the strokes' shutters or the shares, and the side in pixels of the blocks that share a
             texel.

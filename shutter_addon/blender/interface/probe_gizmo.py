@@ -107,7 +107,7 @@ class SHUTTER_GT_probe(Gizmo):
 
 
 def _draw(region: Region, point: Sequence, shutters: Sequence, shares: np.ndarray, mixed: np.ndarray) -> None:
-    """Draw the probe: a box with the pixel's mixed shutter as bars, and a line with the share of each shutter.
+    """Draw the probe: a cross at the pixel, and a box with its mixed shutter as bars and a line for each share.
 
     Args:
         region: The preview's region.

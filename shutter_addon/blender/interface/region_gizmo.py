@@ -44,7 +44,7 @@ def _strokes_now(scene: Scene, effect: PropertyGroup, strip: Strip) -> list[np.n
     no strokes ([]).
 
     Raises:
-        EffectError: A stroke is too far outside the picture.
+        EffectError: A stroke is too far outside the picture, or the strip's transform is not finite.
     """
     index, frame = effect.active_region, scene.frame_float
     region = effect.regions[index]

@@ -44,7 +44,8 @@ def show(context: Context) -> None:
     """Show the active effect's source strip in previews, so that the user can draw on a sharp frame.
 
     This sets *Display Channel* to the channel of the source strip in previews that show all channels and have the
-    effect's annotation. Do nothing if the source is missing, muted, or not in the same meta strip as the effect.
+    effect's annotation. Do nothing without an active effect, or if its source is missing, muted, or in another
+    meta strip.
     """
     active = selection.active(context)
     source = active and strips.nearest_source(*active)
@@ -91,10 +92,9 @@ def is_shown(space: SpaceSequenceEditor) -> bool:
 
 
 def _tool_chosen() -> None:
-    """Show the result instead of the source strip, if the user has activated a tool that does not draw.
+    """Show the result instead of the source strip, if a tool is now active that neither draws nor erases.
 
-    Then no tool is restored after a stroke. Blender calls this when the active tool changes, since it redraws no
-    preview then.
+    Then no tool is restored after a stroke. Blender calls this when the active tool changes (`listen`).
     """
     tool = bpy.context.workspace.tools.from_space_sequencer("PREVIEW", create=False)
     if tool is not None and not tool.idname.startswith(_TOOLS):
@@ -121,7 +121,7 @@ _OWNER = object()  # of the message bus subscription
 
 
 def listen() -> None:
-    """Subscribe to changes of the active tool. Call this after each file is loaded, which ends them."""
+    """Subscribe to changes of the active tool. Call this after each file is loaded, which ends the subscription."""
     tools = bpy.types.WorkSpace, "tools"
     bpy.msgbus.clear_by_owner(_OWNER)
     bpy.msgbus.subscribe_rna(key=tools, owner=_OWNER, args=(), notify=_tool_chosen)

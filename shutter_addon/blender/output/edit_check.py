@@ -44,7 +44,7 @@ def effects(scene: Scene, frames: range) -> tuple[list[str], list[str], set[Path
 
 
 def _shown_effects(film: Scene, frames: range) -> Iterator[tuple]:
-    """Yield all effects that are shown at some of a film's frames.
+    """Yield the effects that some of a film's frames show; in scenes inside its scene, those shown at any frame.
 
     Yields:
         Scene, effect, its first effect strip, and the timeline frames of that scene at which the effect is shown.
@@ -68,7 +68,7 @@ def _notes(session: RenderSession, folders: set[Path], taken: snapshot.Snapshot)
         taken: The effect's snapshot, at the frames to check.
 
     Raises:
-        OutputError, effect_source.FAULTS: The first fault that is found.
+        effect_source.FAULTS: The first fault that is found.
     """
     context = RenderContext(session)
     requests = [context.request(taken, frame) for frame in sorted(taken.frames)]
@@ -126,7 +126,7 @@ def _check_readable(source: FrameSource, indices: set[int], step: int = 1) -> No
 
 
 def _lacking_mattes(source: FrameSource, requests: list[Request], folders: set[Path]) -> int:
-    """Check that matte files can be read at the frames of some pictures, and count outlines that are not tracked yet.
+    """Check that matte files can be read at the frames of some pictures, and count tracked mattes that are missing.
 
     Args:
         source: The effect's footage.
@@ -134,7 +134,7 @@ def _lacking_mattes(source: FrameSource, requests: list[Request], folders: set[P
         folders: A set to which the folders are added where missing tracked mattes will be stored.
 
     Returns:
-        The number of frames of outlines' mattes that the render will have to track.
+        The number of mattes of outlines (one for each outline and frame) that the render will have to track.
 
     Raises:
         MediaError: A matte cannot be read.

@@ -95,8 +95,8 @@ def _feed(film: _Film, scene: Scene, strip: Strip, is_blended: bool) -> bool:
         is_blended: Whether Blender would blend that strip with one below, which changes the last bits of colors.
 
     Returns:
-        False: the engine has to render this frame, because the picture is not opaque, has another size than the film,
-        or failed. After a failure, the file is no longer used, and the engine reports the fault.
+        Whether to show the file. False: the engine has to render this frame, because the picture is not opaque, has
+        another size than the film, or failed. After a failure, the file is no longer used, and the engine reports it.
     """
     try:
         shown = scene.frame_current - strips.origin(strip) + strip.scene.frame_start

@@ -46,7 +46,7 @@ class OutputError(UserError, ValueError):
 
 
 class InterruptedRenderError(OutputError):
-    """The user or a render farm stopped the render. The message names the output, and what is kept of a movie."""
+    """The work was stopped from outside, as by Ctrl-C. The message names the output, and what is kept of a movie."""
 
 
 def is_movie(path: Path) -> bool:
@@ -60,7 +60,7 @@ def size(scene: Scene) -> tuple[int, int]:
 
 
 def check(path: Path, file_format: str | None, size: tuple[int, int]) -> None:
-    """Check that Blender can write a film to a path. A missing folder is no error.
+    """Check that Blender can write a film of this size to such a path. Whether it may write there is not tried.
 
     Args:
         path: A movie, or a folder of pictures.
@@ -68,7 +68,7 @@ def check(path: Path, file_format: str | None, size: tuple[int, int]) -> None:
         size: Width and height of the pictures in pixels.
 
     Raises:
-        OutputError: Blender cannot write the film there.
+        OutputError: The size, the path or the option does not fit.
     """
     width, height = size
     if width < 4 or height < 4:
@@ -271,6 +271,7 @@ def render_frames(scene: Scene, output: Path, moved: Callable[[], None], move: M
 
     Raises:
         OutputError, InterruptedRenderError: As in `render_made_edit`.
+        OSError: The part folder cannot be made, or the movie cannot be moved.
     """
     is_film = is_movie(output)
     faults: list[str] = []
@@ -304,7 +305,7 @@ def render_frames(scene: Scene, output: Path, moved: Callable[[], None], move: M
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder if it is missing, and remove unfinished files in it that processes left when they ended.
+    """Make a folder if it is missing, and remove part folders in it that killed processes left (atomic_write.clear_up).
 
     Raises:
         OSError: The folder cannot be made.
@@ -317,7 +318,8 @@ def _rescued(part: Path, output: Path) -> str:
     """Keep the finished part of a movie beside its output, under a new name.
 
     Returns:
-        The end of an error message, with the number of frames and the name; "": nothing is finished or can be kept.
+        The end of an error message, with the number of frames and the name; "": no frame is finished, PyAV is missing,
+        or the file cannot be moved.
     """
     count = whole_pictures(part)
     if count == 0:
@@ -348,8 +350,8 @@ def _moved(part: Path, output: Path, scene: Scene, update: Callable[[], None], m
         move: Called with a finished picture and its final path.
 
     Yields:
-        The final paths of pictures that are not moved yet, by file name. It shrinks during the render; empty for a
-        movie.
+        A dictionary of the final paths of pictures that are not moved yet, by file name. It shrinks during the render,
+        and is empty for a movie.
     """
     frames = range(scene.frame_start, scene.frame_end + 1)
     settings = scene.render.image_settings

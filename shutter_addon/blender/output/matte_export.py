@@ -25,13 +25,13 @@ EffectStrip = tuple[Scene, PropertyGroup, Strip]
 
 
 def recipe_for(scene: Scene, effect: PropertyGroup, strip: Strip, path: Path) -> Effect:
-    """Return an effect as a recipe that will be saved at `path`. Write mattes that have no file of their own.
+    """Return an effect as a recipe that will be saved at `path`. Write mattes that it cannot name by their own file.
 
-    Their pictures are written into a folder "NAME mattes" beside the recipe.
+    Their pictures are written into folders in "NAME mattes" beside the recipe.
 
     Raises:
         effect_source.FAULTS: The effect cannot be rendered, or a matte cannot be read or written.
-        OSError: The folder cannot be made.
+        OSError: The folder cannot be made or written to.
     """
     regions, shown = _mattes(effect), (scene, effect, strip)
     # Find faults before anything is written.
@@ -103,14 +103,14 @@ def _read_files(scene: Scene, effect: PropertyGroup, strip: Strip) -> Iterator[P
 
 
 def _refuse_overwriting(folders: list[Path | None], *shown: Any) -> None:
-    """Check that pictures are not written into a folder from which the effect reads others.
+    """Check that pictures are not written into a folder from which the effect reads a file.
 
     Args:
         folders: Where pictures will be written; None entries are ignored.
         shown: Scene, effect and effect strip, the arguments of _read_files.
 
     Raises:
-        EffectError: The effect reads pictures from one of the folders.
+        EffectError, MediaError: The effect reads a file from one of the folders, or its files are not known.
     """
     taken = {file.parent.resolve() for file in _read_files(*shown)}
     for folder in folders:

@@ -43,7 +43,7 @@ def in_words(error: BaseException) -> str:
 
 @dataclass(frozen=True)
 class Detail:
-    """How detailed a picture is; previews have less detail than renders.
+    """How detailed a picture is; previews may have less detail than renders.
 
     Attributes:
         divisor: How many times smaller than the source the picture is in width and height (media.open_source).
@@ -71,9 +71,10 @@ class SourceKey:
         spec: The footage.
         steps: Frames from a filmed frame to the next: 1, or n with n − 1 computed in between.
         skip_repeats: Whether computed frames replace filmed ones that repeat the frame before. False if `steps` is 1.
-        detail: The wanted detail. Its `smooth` is True if the effect has no computed frames, whatever was wanted, so
-            that the key is the same.
-        folder: Folder in which optical flow vectors are stored; None: they are not stored.
+        detail: The wanted detail. Its `smooth` is True if the effect is known to have no computed frames, whatever was
+            wanted, so that the key is the same.
+        folder: Folder of the .blend file, which has the folder VECTORS of stored optical flow vectors; None: none are
+            stored or read.
     """
 
     scene: int
@@ -107,7 +108,7 @@ class SourceKey:
         Args:
             planes: Whether frames may come as planes of luma and chroma (PrefetchSource) if `steps` is 1; else they
                 may anyway.
-            keeps: Whether to write newly computed optical flow vectors to `folder`.
+            keeps: Whether to store newly computed optical flow vectors; stored ones are read in any case.
 
         Raises:
             EffectError, MediaError: The footage cannot be read.
@@ -125,7 +126,7 @@ class SourceKey:
 
 
 def known_steps(snapshot: Snapshot) -> int | None:
-    """Return the result of find_steps if it is known already; None: find_steps would have to compare frames."""
+    """Return the result of find_steps if it is known already; None: find_steps would have to open the footage."""
     key = steps_key(snapshot)
     return 1 if key[1] == 1 else _steps.get(key)
 
@@ -133,7 +134,7 @@ def known_steps(snapshot: Snapshot) -> int | None:
 def find_steps(snapshot: Snapshot) -> int:
     """Return how many steps lead from a filmed frame to the next: 1, or n if n − 1 frames are computed in between.
 
-    With *Smooth* on Automatic, the first call for a footage compares frames, which takes long.
+    With *Smooth* on Automatic, a call compares frames, which takes long, unless the result is cached (by steps_key).
 
     Raises:
         EffectError, MediaError: The footage cannot be read.

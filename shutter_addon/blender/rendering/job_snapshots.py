@@ -25,7 +25,7 @@ from .render_job import Where, job
 
 
 def begin(film: int) -> None:
-    """Store snapshots of all effects that a film shows, or their errors, in job.film_data.taken.
+    """Store snapshots of all effects that a film shows, or their errors, in job.film_data.taken. Call `look`, too.
 
     Call this on the main thread, before the other thread renders.
 
@@ -58,7 +58,7 @@ def _part_at(parts: list[tuple[range, Snapshot]], scene_frame: float) -> Snapsho
 
 
 def end() -> None:
-    """Forget all snapshots after a render, and have sessions stop making pictures ahead."""
+    """Forget a render's data (all of FilmData but `feed`). On a job's thread, also stop making pictures ahead."""
     job.film_data = render_job.FilmData(feed=job.film_data.feed)
     sessions.end_job()
 
@@ -86,11 +86,11 @@ def of(effect_scene: Scene, scene_frame: float, ended: Callable[[], bool] | None
     """Return the snapshot (plain data) for a frame of an effect scene, and the timeline frame that shows it.
 
     Args:
-        ended: Called to tell whether the result is no longer wanted; None: wait for a few seconds at most.
+        ended: Called to tell whether the result is no longer wanted; None: wait as long as on_main_thread.
 
     Raises:
         effect_source.FAULTS: The effect cannot be shown.
-        StoppedError: It is no longer wanted.
+        StoppedError: It is no longer wanted, or without `ended`, the main thread has not answered in time.
     """
     uid = effect_scene.session_uid
     if render_job.where() is Where.JOB:
@@ -159,7 +159,8 @@ def asked_frames(scene: Scene, parts: list[Strip], is_film: bool) -> set[float]:
     Args:
         scene: The scene that has the strips.
         parts: The effect strips: all parts of a cut one, or one of them.
-        is_film: Whether `scene` is the rendered one: then frames outside its frame range are left out.
+        is_film: Whether `scene` is the rendered one: then frames outside its frame range are left out. The
+            range is extended to the current frame.
     """
     first, last = scene.frame_start, scene.frame_end
     asked = set()

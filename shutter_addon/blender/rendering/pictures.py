@@ -31,12 +31,13 @@ def picture(context: RenderContext, snapshot: Snapshot, frame: float, detail: De
     """Return the picture of an effect strip at a timeline frame, (H, W, 4), top row first.
 
     It is scene-linear float32 with premultiplied alpha, or 8-bit display levels if the context asks for them.
+    This also writes the file of --weights, if that is wanted, and gives warnings (`shortages`) to context.say, once.
 
     Args:
         context: The session that makes the picture, and the form that is wanted (RenderContext).
 
     Raises:
-        effect_source.FAULTS: The picture cannot be made.
+        effect_source.FAULTS: The picture cannot be made, or the file of --weights cannot be written.
         StoppedError: It is no longer wanted.
     """
     stopping.check()

@@ -117,7 +117,8 @@ class _Looking:
     Attributes:
         whole: The picture that the user looks at with *Full Quality*; None: that is off.
         late_until: Time (time.monotonic) until which pictures may be late, because the user scrubs or tracks.
-        decision: What for_engine has decided in this redraw, for take_decision; None: nothing.
+        decision: What for_engine has decided in this redraw, for take_decision; None: Blender has not asked the engine,
+            or not for the effect and frame that the preview shows, or an operator or tool reads the picture.
         slices: The limits of time in which a slow picture is made piece by piece, between redraws.
         pen: What drawing strokes has changed.
         emptied: Addresses (as_pointer) of sequencer spaces from which an effect's annotation was taken, so that they
@@ -166,7 +167,7 @@ def for_engine(context: Context, effect_scene: Scene) -> Decision | None:
 
 
 def take_decision() -> Decision | None:
-    """Return what for_engine decided for this redraw, and forget it; None: Blender has not asked the engine."""
+    """Return what for_engine decided for this redraw, and forget it; None: nothing was kept."""
     decision, looking.decision = looking.decision, None
     return decision
 
@@ -224,8 +225,8 @@ def _snapshot(shown: Shown) -> Snapshot:
 def _requested(context: Context, shown: Shown, snapshot: Snapshot, look: Look) -> tuple[Request, bool]:
     """Return _best's request for the shown frame, in full detail while *Full Quality* is on, else in that of previews.
 
-    *Full Quality* ends here if another frame is shown, the effect has changed, the film plays, or the user scrubs or
-    tracks.
+    *Full Quality* ends here if another effect or frame is shown, the effect has changed, the film plays, or the user
+    scrubs or tracks.
 
     Returns:
         The request, and whether a better picture follows (_best).
@@ -242,7 +243,7 @@ def _requested(context: Context, shown: Shown, snapshot: Snapshot, look: Look) -
 
 
 def _best(context: Context, snapshot: Snapshot, frame: float, detail: effect_source.Detail) -> tuple[Request, bool]:
-    """Return the best picture that a preview can show now.
+    """Return the request for the best picture that a preview can show now.
 
     Returns:
         The request, and whether it is a stand-in: a picture without frames computed between filmed ones, shown until
@@ -276,11 +277,12 @@ def _detail(context: Context, look: Look) -> effect_source.Detail:
 def _is_drawn(context: Context, shown: Shown, look: Look, source: FrameSource, *, is_less: bool) -> bool:
     """Tell whether our draw handler shows the picture instead of Blender, which is allowed where both look the same.
 
-    A still picture of full size is left to Blender, because what the handler draws has only 8 bits.
+    A still result of full size is left to Blender, because what the handler draws has only 8 bits.
 
     Args:
         source: The opened footage, in the previews' size.
-        is_less: Whether the picture is plain, or drawn while the film plays or the user scrubs: a better one follows.
+        is_less: Whether the picture is plain, or drawn while the film plays or the user scrubs or tracks: a better
+            one follows.
     """
     settings = context.window_manager.virtual_shutter
     is_small = source.from_proxy or source.width < annotations.picture_size(shown.effect)[0]

@@ -83,7 +83,8 @@ class _Job:
     """The render that is running, or ran last.
 
     Attributes:
-        film: session_uid of the rendered scene, not of effect scenes or scenes in strips; None: nothing renders.
+        film: session_uid of the scene that the user renders, not of scenes in its strips; None: nothing renders. View ▸
+            Render Sequencer Animation only tells of effect scenes: one of them.
         begun: Whether its first frame has begun.
         stopping: Whether it ends after the current frame, as after Ctrl-C.
         failure: The sentence that says why it ends, or why the last one ended.
@@ -120,7 +121,7 @@ job = _Job()
 
 
 def say_once(text: str, to: Callable[[str], None]) -> None:
-    """Call `to` with a sentence for the user, unless the same sentence was said before."""
+    """Call `to` with a sentence for the user, unless it was said before, also in an earlier render."""
     if text not in job.said:
         job.said.add(text)
         to(text)
@@ -130,8 +131,8 @@ def begin(scene: Scene) -> bool:
     """Note that a render begins.
 
     Returns:
-        Whether it is a render that the user started, of a film or a picture. False: Blender renders an effect scene for
-        such a render, or for a preview.
+        Whether it counts as the running render (_Job.film), of a film or a picture. False: Blender renders a scene of a
+        strip for such a render, or an effect scene for a preview.
     """
     is_effect = scene.render.engine == ENGINE
     if job.film is not None and (job.begun or is_effect):
@@ -233,7 +234,7 @@ def scripts_act() -> bool:
 
 
 def on_main_thread(function: Callable[[], T], ended: Callable[[], bool] | None = None) -> T | None:
-    """Call a function and return its result: on Blender's main thread if this is a job's thread, otherwise here.
+    """Call a function and return its result: on Blender's main thread from a job's (Where.JOB), otherwise here.
 
     Args:
         function: The function. Its errors are raised to the caller.

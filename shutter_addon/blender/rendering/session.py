@@ -112,8 +112,8 @@ class RenderContext:
     def request(self, snapshot: Snapshot, frame: float, detail: Detail | None = None) -> Request:
         """Return the request for an effect strip's picture at a timeline frame.
 
-        It has all that the picture depends on, as plain data. This opens the footage if necessary. The last request of
-        each effect is kept, and returned again for the same arguments.
+        It has all that the picture depends on, as plain data. This opens the device and the footage if necessary. The
+        last request for each SourceKey.place is kept, and returned again for the same arguments.
 
         Args:
             snapshot: The effect and its source, as plain data.
@@ -146,7 +146,7 @@ class RenderContext:
 
 
 class RenderSession:
-    """A device that composes pictures, with a renderer for each of the effects shown last.
+    """A device that composes pictures, with the renderers of the effects shown last: one or two for each.
 
     Renderers keep the frames that they have loaded, so that the next picture needs few new ones. At most _KEPT effects
     have renderers; the ones unused for longest are closed.
@@ -208,7 +208,7 @@ class RenderSession:
             return self._submit(function, *arguments).result()
 
     def _submit(self, function: Callable, *arguments: object) -> Work:
-        """Queue a function on the device's thread, or call it here at once if the device has none."""
+        """Queue a function on the device's thread. Call it here at once if the device has none, or Python exits."""
         ended = threading.Event()
         if self.threaded:
             with suppress(RuntimeError):  # at Python's exit, threads take no more work
