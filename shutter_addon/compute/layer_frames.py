@@ -28,9 +28,7 @@ LARGEST = np.finfo(np.float32).max  # the most light
 
 
 class RecentFrames(SourceWrapper):
-    """A wrapper of a source that caches the frames that were read last.
-
-    It caches as many as fit into RECENT_BYTES, but at least eight.
+    """A wrapper of a source that caches the frames that were read last: as many as fit into RECENT_BYTES, at least 8.
 
     Each layer has a window of its own, and all windows read the same frames one after another.
     """
@@ -59,7 +57,8 @@ class RecentFrames(SourceWrapper):
 class WeightedFrames(SourceWrapper):
     """A source whose frames are those of another one times weights, in linear light: what a layer's window reads.
 
-    For a layer, the weights are its matte. For the background, they are the share of it that all layers leave visible.
+    For a layer, the weights are its matte times its opacity. For the background, they are the share of it that all
+    layers leave visible; where it was taken from other frames, nearly 1 (LayerColors.weights).
     Opaque 8-bit frames become half floats, all others float32.
 
     Attributes:
@@ -274,7 +273,7 @@ class LayerColors:
     Colors can differ from the footage: at soft edges they are separated (*Clean Edges*), and behind layers the
     background can come from other frames. Frames keep the sample type and transfer of the source. In all methods, a
     layer is given by its index, and the background behind all layers by −1. Call `begin` for each picture before any
-    other method.
+    other method but `clear`.
 
     Attributes:
         layers: The layers from the last call of `begin`.
@@ -364,15 +363,7 @@ class LayerColors:
         return self._memo(frame, number, lambda: self._separate(frame, number))
 
     def _separate(self, frame: int, number: int) -> tuple[np.ndarray, np.ndarray]:
-        """Make what `_separated` caches.
-
-        Args:
-            frame: The source frame.
-            number: The index of the layer that is the subject. −1: all layers together are.
-
-        Returns:
-            As for `_separated`: the frame (H, W, 4) with the subject's colors, and with those behind it.
-        """
+        """Make what `_separated` caches. Arguments and result as there; `number` is the layer."""
         mattes = self._mattes.edges(self.layers, frame)
         matte = 1 - layering.behind(mattes) if number < 0 else mattes[number]
         picture, mixed = as_rgba(self._source.decoded(frame)), (matte > 0) & (matte < 1)
@@ -515,14 +506,16 @@ def filled(picture: np.ndarray, known: np.ndarray) -> np.ndarray:
     coarse to fine, unknown pixels are interpolated from the next coarser picture. The result resembles diffusion, but
     is quicker.
 
-    If no pixel is known, all become 0. A picture that is one pixel wide or high is otherwise returned as it is.
+    If no pixel is known, all become 0.
 
     Args:
         picture: (H, W, C) float32. Values of unknown pixels do not matter.
         known: Which pixels are known, (H, W) bool.
     """
-    if known.all() or min(known.shape) < 2:
-        return picture if known.any() else np.zeros_like(picture)
+    if not known.any():
+        return np.zeros_like(picture)
+    if known.all():
+        return picture
     height, width = known.shape
     pad = [(0, height % 2), (0, width % 2)]
     weights = np.pad(known.astype(np.float32), pad)

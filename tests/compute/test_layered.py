@@ -218,6 +218,8 @@ def test_what_is_hidden_altogether_is_nothing_to_fill_from(device):
     covered, _ = with_layers(FrameState(options, np.ones((3, 4))), np.full_like(matte, 0.97))
     _, picture = drawn(device, source, covered)
     np.testing.assert_allclose(picture[..., 3], 1, atol=1e-6)  # of opaque footage, even if nothing is known
+    wide = np.arange(8)[None] < 3
+    assert (layer_frames.filled(wide[..., None].astype(np.float32), wide) == 1).all()
 
 
 def test_frames_are_uncovered_anew_where_others_change_that_they_are_taken_from(device):
