@@ -67,8 +67,8 @@ def way_of(window: Window, state: FrameState, values: np.ndarray, shortened: boo
 
     Returns:
         "value" for value interpolation. Otherwise "sums" (few pieces, from running sums), "pieces" (few pieces, from
-        frames), "frames" (many pieces) or "search" (medians, and where "frames" would take too many loop iterations for
-        llvmpipe).
+        frames), "frames" (many pieces, or lightest and darkest) or "search" (medians, and where "frames" would take too
+        many loop iterations for llvmpipe).
     """
     if state.options.interpolation == "value":
         return "value"
@@ -120,7 +120,7 @@ def filled_rows(rows: int) -> float:
     """Return to how many pieces a table must be filled up: compose_sums is compiled only for some numbers of pieces.
 
     Args:
-        rows: The number of pieces that the table has.
+        rows: The number of pieces that the table has, or half the number of its knots, rounded up.
 
     Returns:
         The smallest number in _ROWS that is at least `rows`; infinity if `rows` is larger than all.

@@ -100,7 +100,7 @@ def _ends(pixels: slice) -> tuple[int, int]:
 
 
 def _around(places: np.ndarray, source: FrameSource) -> Tile:
-    """Return the rows and columns of a source's frame that cover all places x + iy, with a margin of 3 pixels."""
+    """Return the part of a source's frame that covers all places x + iy and 3 pixels around, clipped at its edges."""
     sides = (places.imag, source.height), (places.real, source.width)
     rows, columns = (np.clip((along.min() - 3, along.max() + 3), 0, size - 1).astype(int) for along, size in sides)
     return slice(rows[0], rows[1] + 1), slice(columns[0], columns[1] + 1)
@@ -114,8 +114,9 @@ def _tiles(source: FrameSource) -> Iterator[Tile]:
 
 
 class CPUCompositor:
-    """Composes pictures with NumPy, on machines without a GPU. It implements request.Compositor and request.Stages.
+    """Composes pictures with NumPy. It implements request.Compositor and request.Stages.
 
+    It is for machines without a GPU, and for pictures that a GPU's passes cannot make (GPUCompositor._draw_on_host).
     Pictures and coefficients are NumPy arrays, windows are HostWindow.
     """
 

@@ -35,6 +35,9 @@ def diffuse(labels: np.ndarray, count: int, guide: np.ndarray | None = None, str
         guide: A reduced or full-size picture whose edges stop the diffusion, (h, w, 3 or more), as for
             core.pixels.conductances. Its cells are 1, 2, 4, … pixels wide. None: nothing stops the diffusion.
         strength: How strictly edges stop it, from 0 (not at all) to 1.
+
+    Raises:
+        StoppedError: The calling thread's work was cancelled.
     """
     drawn = np.flatnonzero(np.bincount(labels.ravel(), minlength=count + 1)[1:])  # the others are 0 everywhere
     coefficients = np.zeros((count, *labels.shape), np.float32)

@@ -52,8 +52,8 @@ def operators(ties: str) -> dict[str, Pass]:
     """Return the passes of shaders/multigrid.glsl for one way in which cells are coupled.
 
     Args:
-        ties: How neighboring cells are coupled: "STENCIL" by nine-point operators (coarser grids), "LABELS" equally
-            between free pixels, "LINKS" by conductances between pixels that are small at edges.
+        ties: How neighboring cells are coupled: "STENCIL" by nine-point operators (coarser grids), "LABELS" free
+            pixels equally to all their neighbors, "LINKS" by conductances between pixels that are small at edges.
 
     Returns:
         {name: pass}. "weights" computes the prolongation P, "coarsen" the operator PᵀAP of the next coarser grid,
@@ -97,11 +97,13 @@ class _Grid:
         codes: For all tiles of 8 × 8 and of 4 × 4 cells, the numbers by which shaders know them (_codes).
         ranges: {list: (first, last)}: where each list of tiles lies in the texture that has the lists of all grids.
             Tiles have 8 × 8 cells, except those of the last two lists:
-            near: tiles that this grid solves: those with free cells, on coarser grids also those beside them
+            near: tiles that this grid solves: of the tiles in the attribute `reached`, those with free cells, on
+                coarser grids also those beside such
             reached: near tiles and those around them, where W still has an effect
-            far: tiles with free cells that are not reached; their values come from the next grid
+            far: tiles like near ones, but not in the attribute `reached`; their values come from the next grid
             rim: tiles that are not near, at the ends of rows or columns that go beyond the next grid's last cells
-            anew: tiles that _start has to set, since the last solve may have left values there
+            anew: tiles that _start has to set: those that this or the last solve reached, those around near ones, and
+                at full size those without free cells
             feeding: near tiles and those around them, as tiles of 4 × 4 cells of the next grid
             changed: tiles of 4 × 4 cells whose operator may differ from that of the last solve
     """
@@ -207,7 +209,7 @@ class Diffusion:
     def _list_tiles(self, labels: np.ndarray, whole: int, *, anew: bool = False) -> None:
         """List the tiles that each pass has to go through, and send the lists to the device.
 
-        This sets `ranges` and the other attributes of tiles of all grids (_Grid).
+        This sets `ranges`, `reached`, `touched` and `solid` of all grids (_Grid).
 
         Args:
             labels: (H, W), as for `solve`.
@@ -370,7 +372,7 @@ class Diffusion:
             program: The pass. It gets the grid's textures and sizes by name, as far as it has them.
             grid: The grid.
             tiles: The name of the list, a key of _Grid.ranges.
-            cells: Invocations for each tile.
+            cells: Invocations for each tile; for the pass "weights", for two tiles.
             layers: The number of layers (of four shutters) to run it on.
             extra: Further textures and constants of the pass, by name. They replace those of the grid.
         """

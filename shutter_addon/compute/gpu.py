@@ -306,9 +306,9 @@ class GPUCompositor:
     def draw(self, window: Handle, request: Request, coefficients: Coefficients) -> Texture:
         """Expose a window's frames on the device. Return the picture, premultiplied: a texture array with one layer.
 
-        If request.levels is False, it is rgba32f, scene-linear, bottom row first. Otherwise it is rgba8 with 8-bit sRGB
-        values over black, top row first. The texture belongs to the window: the window's next picture of this format
-        overwrites it.
+        If request.levels is False, it is rgba32f, scene-linear, bottom row first. Otherwise it is rgba8, top row first:
+        the sRGB values of straight colors times alpha, and alpha. The texture belongs to the window, whose next picture
+        may overwrite it.
 
         Args:
             window: The window. All frames that the picture exposes must be loaded in it.
@@ -399,7 +399,7 @@ class GPUCompositor:
         return selected, share
 
     def _draw_on_host(self, window: Handle, request: Request, coefficients: Coefficients) -> Texture:
-        """Draw a picture whose shutters take the median of frames with NumPy, and send it to the device.
+        """With NumPy, draw a picture whose shutters take the median of frames, and send it to the device.
 
         Used if exposures follow a motion, as their median needs all frames in one pass, or if the pass would take too
         many loop iterations for llvmpipe. All exposed frames are read from the footage again. Arguments and result as
@@ -418,8 +418,8 @@ class GPUCompositor:
     def _draw_moved(self, window: WholeFrames, request: Request, coefficients: Coefficients) -> Texture:
         """Draw a picture whose exposures follow a motion (FrameState.following).
 
-        A window may have several texture arrays of frames, with a shader pass for each. A pass adds its frames to the
-        sum of the passes before; the last one finishes the picture. Arguments and result as for `draw`.
+        A window may have several texture arrays of frames, with a shader pass for each. A pass combines its frames with
+        the result of the passes before; the last one finishes the picture. Arguments and result as for `draw`.
         """
         state, options, size = request.state, request.state.options, (window.source.width, window.source.height)
         (combine,), (first, last) = state.groups, state.open_span

@@ -203,7 +203,8 @@ class LayeredRenderer:
     ) -> np.ndarray | None:
         """Make a picture of the background for pixels where it shows through the layers, but too little was exposed.
 
-        Holes are taken from other frames of the shot, and otherwise filled from their surroundings.
+        Holes are taken from the nearest filmed frame of the shot that shows the background there, which may be an
+        exposed one. Holes that none shows are filled from their surroundings.
 
         Args:
             request: The picture.

@@ -29,7 +29,8 @@ class Request:
         direction: 1, or −1 if the footage plays backward. Later frames of the window then have lower numbers.
         source: Any hashable value that stands for the footage and its size. A caller with several renderers finds the
             right one by it; renderers only compare it.
-        levels: Whether the picture has 8-bit sRGB values, over black. Otherwise it is scene-linear float32.
+        levels: Whether the picture has 8-bit sRGB values, over black from Renderer.picture. Otherwise it is
+            scene-linear float32.
         quick: Whether the diffusion may start from its last result. It is then quicker, and the picture depends
             slightly on the one before.
         display: Converts the finished picture, which is opaque and scene-linear, to the 8-bit values of Blender's
@@ -109,7 +110,7 @@ class Behind(NamedTuple):
         plain: The picture without layers, which is shown at pixels where no layer is in any exposed frame. None: not
             needed, `exposed` is used there, too.
         plate: (H, W, 4), linear light, top row first: the background where the exposure shows too little of it. None:
-            it shows enough everywhere.
+            no pixel needs it.
     """
 
     exposed: Exposure
@@ -161,8 +162,8 @@ class Stages(Protocol):
         Args:
             beneath: The coefficients beneath: how much of each shutter a pixel gets.
             mattes: The mattes, the lowest first. They tell the shutter, opacity and kind of blending.
-            layers: (key, values) for each matte: values (h, w) float32, 0 to 1, without opacity; and a hashable key
-                that is equal for equal values, which are then not sent again.
+            layers: (key, values) for each matte: values (h, w) float32, 0 to 1, without opacity; and a hashable key.
+                Equal keys mean equal values, which need not be sent again.
         """
 
     def least_share(self, exposed: Exposure) -> float:
@@ -174,7 +175,8 @@ class Stages(Protocol):
         Args:
             behind: The background.
             layers: The exposed layers, the farthest first; at least one.
-            levels: Whether to return 8-bit sRGB values over black. Otherwise the picture is scene-linear float32.
+            levels: Whether to return 8-bit sRGB values (over black with NumPy, on a GPU with alpha, as from
+                GPUCompositor.draw). Otherwise the picture is scene-linear float32.
         """
 
     def release(self) -> None: ...

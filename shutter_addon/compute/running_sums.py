@@ -125,9 +125,9 @@ class Sums(Window):
         return self._frames.values()
 
     def load(self, positions: np.ndarray, options: Options, shot: range) -> None:
-        """Make the sums for all positions from the lowest to the highest of the given ones.
+        """Sum the frames at all positions from the lowest to the highest of the given ones.
 
-        Sums that the window holds already are kept where they are of use. Only frames whose sums are missing are read.
+        Sums that the window holds already are kept where they are of use. A frame that it has summed is not read again.
 
         Args:
             positions: Frame numbers from core.model.windows.positions, at most `capacity` − 1 apart.
@@ -333,8 +333,8 @@ class WeightedSums(Sums):
     """A window of running sums for a layer or the background: of frames times weights, and of the weights.
 
     The frames are opaque and 8-bit. Textures are rgba32ui: red, green, blue, and the sum of weights (for the
-    background, of 1 − weight), with 32 bits each. Where all weights are 1, pictures are equal to those from Sums in
-    every bit.
+    background, of 1 − weight), with 32 bits each. Where all weights of the background are 1, its picture is equal to
+    that from Sums in every bit.
     """
 
     def __init__(self, device: Device, source: WeightedFrames, capacity: int, shutters: int = 1) -> None:

@@ -77,7 +77,8 @@ class Stages:
     ) -> Texture:
         """Lay mattes over coefficients, and return the new coefficients as a texture array. See request.Stages.blend.
 
-        Values of mattes stay on the device. Values whose key is unchanged since the last call are not sent again.
+        The device keeps the values of up to MOST_MATTES mattes. Those that it still has, by their keys, are not sent
+        again. With more mattes, later ones replace the values of earlier ones.
         """
         height, width = layers[0][1].shape
         values = self._textures.of("mattes", (width, height, min(len(mattes), MOST_MATTES)), "r32f")

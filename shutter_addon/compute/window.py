@@ -72,7 +72,7 @@ class Window:
         kind: The GLSL format of its texture arrays.
         parts: The parts into which it is divided, one for each texture array.
         shutters: The number of shutters of its pictures.
-        is_open: Whether it has its textures. A released window cannot be used again.
+        is_open: Whether it can be used. A released window cannot be used again.
         sends: Whether frames stay on the host and are sent again for every picture, since the device has no room for
             them.
         cover: Which weights its frames were multiplied by: 0 none, 1 those of a layer, 2 those of the background.
@@ -177,7 +177,7 @@ class Frames(Window):
     Samples are stored as they are, except for sRGB floats, which are converted to linear light.
 
     If the device has no room for the whole window, the frames stay on the host. Every picture then sends them to the
-    device one after another of Window.parts (here bands of rows). Pictures have the same bits in both cases.
+    device part by part (Window.parts, here bands of rows). Pictures have the same bits in both cases.
     """
 
     def __init__(self, device: Device, source: FrameSource, capacity: int, shutters: int = 1) -> None:
@@ -270,7 +270,7 @@ class WholeFrames(Frames):
     """A window of frames that are not divided into bands of rows, for exposures that follow a motion.
 
     These read pixels anywhere in a frame. Instead, the frames are divided among texture arrays, with as many in each as
-    BAND_BYTES allow.
+    BAND_BYTES (SENT_BYTES and SENT_SHARE, if they stay on the host) and the device allow.
     """
 
     def _divided(self, most: int) -> list[Part]:

@@ -264,7 +264,7 @@ class RenderSession:
     def last_detail(self, scene: int) -> Detail:
         """Return the detail with which an effect's renderer is open, or full detail if none is open.
 
-        If one without and one with moments between filmed frames are open, it is that of the one without.
+        If two are open, it is that of the one without moments between filmed frames.
 
         Args:
             scene: session_uid of the effect scene.
@@ -280,7 +280,7 @@ class RenderSession:
 
         Args:
             key: The footage and how it is read.
-            say: Called with a sentence for the user if the device is a slower one than wanted.
+            say: Called with a sentence for the user if this opens a device that is slower than the wanted one.
 
         Raises:
             effect_source.FAULTS: The device or the footage cannot be opened.

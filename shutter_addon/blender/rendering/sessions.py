@@ -24,7 +24,8 @@ class _Sessions(NamedTuple):
     """The three render sessions, each with its own device and renderers.
 
     Attributes:
-        offscreen: Makes pictures of renders. Its device needs no window.
+        offscreen: Makes pictures of renders. Its device may be the window's GPU, which the main thread then calls for
+            it ("relayed" in available.OPEN).
         window: Makes previews in Blender's window, on Blender's own GPU.
         waited_for: Takes the place of `offscreen` for a render during which the window waits for every picture
             (Where.WAITED_FOR), if `offscreen` uses the window's GPU, which cannot be used then.
@@ -36,9 +37,10 @@ class _Sessions(NamedTuple):
 
 
 def _ask_window() -> None:
-    """On a render job's thread, have the window's previews free their GPU memory. Elsewhere, do nothing.
+    """Have the window's previews free their GPU memory, and wait at most _ANSWER seconds for it.
 
-    Wait at most _ANSWER seconds for it. Previews load their frames again when they are drawn next.
+    Do nothing without a window, on the main thread, or while the window waits for the picture (Where.WAITED_FOR).
+    Previews load their frames again when they are drawn next.
     """
     if render_job.where() is Where.JOB:
         main_thread.ask(SESSIONS.window.free, _ANSWER)
@@ -71,7 +73,7 @@ def of_engine(say: Say) -> RenderContext:
 
 
 def of_render(say: Say = print, *, levels: bool = False, display: Display | None = None) -> RenderContext:
-    """Return the context of a render, on a device that does not need a window.
+    """Return the context of a render.
 
     Its session is `offscreen`, or `waited_for` while Blender's window waits for every picture and `offscreen` would
     need its GPU (_Sessions).
@@ -90,7 +92,7 @@ def of_render(say: Say = print, *, levels: bool = False, display: Display | None
 
 
 def close_if_device_changed() -> None:
-    """Close the session of renders (`offscreen`) if another device would be chosen now, and `waited_for` in any case.
+    """Close the session of renders (`offscreen`) if another device, or none, would be chosen now; always `waited_for`.
 
     Closes all three sessions if the limit of GPU memory was changed in the settings. Called on the main thread before a
     render.

@@ -71,8 +71,7 @@ def allowed(memory: int | None) -> int:
     """Return how many bytes textures may take on a GPU, if the user sets no limit.
 
     It is 75 % of the GPU's memory (UNKNOWN if that is unknown), but at most half of the machine's main memory. It does
-    not depend on what is free, so it is the same at each start: pictures can depend on it in their last bits, and all
-    parts of a film must match.
+    not depend on what is free: pictures can depend on it in their last bits, and all parts of a film must match.
 
     Args:
         memory: The GPU's memory in bytes. None: unknown.
@@ -249,6 +248,7 @@ class Device:
         Raises:
             core.stopping.StoppedError: The calling thread's work was cancelled; the pass did not run.
             NoDeviceError: The device has no room for all of its textures at once.
+            ValueError: One of them was released.
         """
         stopping.check()
         sampled = {name: (textures or {})[name] for name in program.samplers}
@@ -403,7 +403,7 @@ class NamedTextures:
     def of(self, name: str, size: tuple[int, int, int], kind: str = "rgba32f") -> Texture:
         """Return the texture that has a name, with its content from earlier uses.
 
-        If there is none, or it has another size, it is freed, and a new one with undefined content is made.
+        If there is none, a new one with undefined content is made. One of another size is freed and replaced likewise.
 
         Args:
             name: The name, which the caller chooses.

@@ -41,13 +41,13 @@ def frames_iterations(values: np.ndarray, span: tuple[int, int]) -> int:
 
 
 def median_iterations(rows: int, frames: int, kind: str) -> int:
-    """Return how many loop iterations one invocation of the shader compose_search takes to make a median.
+    """Return the most loop iterations that one invocation of the shader compose_search takes to make a median.
 
-    It shows whether the shader can run on llvmpipe. The loops are in shaders/include/combine.glsl.
+    It shows whether the shader can run on llvmpipe. It scans all frames several times (shaders/include/blocks.glsl).
 
     Args:
         rows: The number of pieces (rows after row 0) in the table of shutters.
-        frames: The number of frames of the window that are exposed.
+        frames: The length of FrameState.open_span.
         kind: The GLSL format of the textures with the frames.
     """
     scans = 5 if kind == "rgba8" else 10

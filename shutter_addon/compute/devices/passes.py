@@ -48,7 +48,7 @@ class Pass:
         step: The macro that selects its part of the file; "" if the file has only one.
         defines: {name: value} of its other macros.
         source: The complete GLSL source, version 4.3.
-        body: The source without macros and declarations, as Blender's `gpu` module adds these.
+        body: The source without `defines` and declarations, which Blender's `gpu` module adds.
         samplers: {name: GLSL type}.
         images: {name: Image}.
         constants: {name: GLSL type} of its uniforms.
@@ -78,7 +78,7 @@ class Pass:
 
 @cache
 def read_pass(file: str, step: str = "", **defines: int | str) -> Pass:
-    """Read a pass from shaders/. The result is kept: the same arguments return the same object.
+    """Read a pass from shaders/. The same arguments in the same order return the same object.
 
     Args:
         file: The file's name, without .glsl.
@@ -110,8 +110,7 @@ def _declared(program: Pass, line: str) -> str:
         line: The line, without its comment.
 
     Returns:
-        The declaration, with binding points for samplers, images and uniform blocks; "" if the line declares none of
-        these.
+        The declaration, with binding points for samplers, images and uniform blocks; "" if the line declares nothing.
     """
     defines, samplers, images = program.defines, len(program.samplers), len(program.images)
     if found := _LOCAL_SIZE.fullmatch(line):

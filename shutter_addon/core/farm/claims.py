@@ -53,7 +53,8 @@ class Claims:
     def take(self, name: str) -> bool:
         """Try to reserve a piece of work, and return whether this process has got it.
 
-        It fails while another process holds the claim. A claim that the other process has abandoned is taken over.
+        It fails while the claim is held, also by this process. An abandoned claim is taken over, but only by a later
+        call: this object must first have seen it unchanged for longer than `patience`.
 
         If this returns True, check whether the work has been done already: the last holder may have finished it.
 

@@ -69,10 +69,6 @@ def write(folder: Path, version: EditVersion) -> None:
 
     A job file that is there already is replaced.
 
-    Args:
-        folder: The folder of the rendered pictures.
-        version: The version of the edit that they are rendered from.
-
     Raises:
         OSError: It cannot be written.
     """

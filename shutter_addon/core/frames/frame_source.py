@@ -53,7 +53,7 @@ def matrix(space: int, full: bool) -> Matrix | None:
     Args:
         space: The number of the matrix coefficients in ITU-T H.273, as files store it. 1: BT.709; 5 and 6: BT.601;
             2: unspecified, which counts as BT.601.
-        full: Whether luma has the full range 0 … 255 instead of 16 … 235.
+        full: Whether samples have the full range: 0 … 255, instead of 16 … 235 for luma and 16 … 240 for chroma.
 
     Returns:
         The conversion, or None for any other `space`.

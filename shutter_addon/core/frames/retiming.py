@@ -12,7 +12,8 @@ class RetimingKey:
     """A retiming key of a strip, as Blender stores it: which place of the content is shown at which time.
 
     Attributes:
-        index: The time of the key: timeline frames since StripTiming.content_start, times the `playback_rate`.
+        index: The time of the key: timeline frames since StripTiming.content_start, times the `playback_rate`. If the
+            strip is reversed, they count back from the content's last timeline frame.
         flag: Bits of Blender's eSeqRetimingKeyFlag. If the lowest bit is set, a smooth transition between two speeds
             begins here and ends at the next key.
         factor: The place that is shown at this time, from 0, the content's start, to 1, its end.

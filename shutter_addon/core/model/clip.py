@@ -125,11 +125,12 @@ class Clip:
         return strip.start + min(index, length - 1)
 
     def _content(self, strip: StripTiming) -> tuple[int, float]:
-        """Return the length and the speed of a strip's content: the part of this footage that is not trimmed away.
+        """Return the length and the speed of a strip's content, which begins at StripTiming.start in this footage.
 
         Returns:
-            The number of filmed frames in the content, at least 1, and how many of them pass per timeline frame before
-            retiming (retiming.playback_rate).
+            The number of filmed frames in the footage, less those trimmed away, at least 1 (StripTiming.first is not
+            subtracted, so the content can end after the footage); and how many frames of the content pass per timeline
+            frame before retiming (retiming.playback_rate).
         """
         filmed = (self.count - 1) // self.step + 1
         length = max(1, filmed - strip.content_trim_start - strip.content_trim_end)

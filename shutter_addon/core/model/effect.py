@@ -170,8 +170,9 @@ class Region(AnyRegion):
 class MatteRegion(AnyRegion):
     """A region whose matte says how much of the shutter each pixel gets, 0 to 1.
 
-    `moves` shifts, turns and scales a ramp. Any other matte stays where it is: there, `moves` only describes how the
-    object under it moves, for shutters that follow the region. Without drawings, the center is the picture's.
+    `moves` shifts, turns and scales a mattes.Ramp. Any other matte stays where it is (also a ramp of luminance): there,
+    `moves` only describes how the object under it moves, for shutters that follow the region. Without drawings, the
+    center is the picture's.
 
     Attributes:
         content: What gives the matte's values: a channel of mattes.Content. In an effect that was just read from a
@@ -250,9 +251,7 @@ class SubjectRegion(MatteRegion):
         return self.drawings if self.drawings.frames else self.outlines
 
     def drawn_at(self, frame: float) -> scribbles.Shape:
-        """Return the strokes on the subject that were drawn at exactly this frame, as a shape of the kind "line".
-
-        The shape has no strokes if none were drawn at this frame.
+        """Return the strokes on the subject that were drawn at exactly this frame, if any, as a shape of kind "line".
 
         Raises:
             EffectError: The strokes are too far outside the picture.
@@ -271,10 +270,11 @@ class FileContent:
     """A matte file as a recipe names it, before it becomes a channel of mattes.FileFrame.
 
     Attributes:
-        path: A movie, a picture, or the first file of an image sequence, relative to the recipe's folder.
+        path: A movie, a picture, or the first file of an image sequence: absolute, or relative to the recipe's folder.
         channel: What of the file is the matte: "luminance", "red", "green", "blue", "alpha", or the name of a channel
             of an EXR file.
-        offset: The matte's frame, from 0, that is shown with the first frame of the footage or of the timeline.
+        offset: The matte's frame, from 0, that is shown with the footage's first frame, or for "timeline", at the
+            recipe's frame 1, the strip's first.
         timing: "source": the matte plays with the frames of the footage, however these are retimed; "timeline": it
             plays one frame per timeline frame.
     """
@@ -458,10 +458,11 @@ class Effect:
 
     Attributes:
         shutters: The first one is the default, which pixels get where no region gives them another.
-        regions: Later regions lie over earlier ones, and all mattes lie over all scribbles (regions of strokes).
+        regions: Later regions lie over earlier ones, but all mattes over all scribbles (regions of strokes), and all
+            layers (AnyRegion.layer) over both.
         options: Channel of frame_state.Options. Their `edge_aware` is ignored in favor of the channel below.
         time: Channel of (source frame, whether the footage runs backward), where the footage's first frame is 1. None:
-            the timing of the strip tells which frame is shown.
+            Clip.timing tells which frame is shown.
         edge_aware: Channel of 0 to 1, the value for Options.edge_aware.
         camera: The camera's motion, which shutters can follow.
         lost: A warning that a recipe of an older version cannot be reproduced exactly (Shutter.lost), or None.
@@ -510,10 +511,10 @@ class Effect:
         return replace(self, shutters=shutters_, regions=tuple(regions))
 
     def for_picture(self, aspect: float) -> Effect:
-        """Return the effect of a recipe with the aspect of the pictures, set in the drawings of all regions.
+        """Return the effect of a recipe with the aspect of the pictures, set in Subject.drawings of all regions.
 
         A recipe does not contain the aspect. It is needed to rotate strokes, as their points are fractions of width and
-        height.
+        height. SubjectRegion.nots and SubjectRegion.outlines keep the aspect that they have.
 
         Args:
             aspect: The picture's width / height.

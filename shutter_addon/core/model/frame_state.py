@@ -56,7 +56,7 @@ class Options:
         position: Whether the shown frame is the window's first ("start"), middle ("center") or last ("end") frame.
         interpolation: How two shutters are mixed in a pixel, or two keys in time: "displacement" moves the exposure in
             time; "value" cross-fades.
-        light: Whether frames are summed in "linear" light, or as the "encoded" values of the footage.
+        light: Whether frames are summed in "linear" light, or as "encoded" (sRGB) values, whatever the footage has.
         exposure: "normalized": all shutters give the same brightness; "weighted": see FrameState.gains.
         edges: What is exposed beyond the ends of the clip or shot: "hold", "mirror", "shorten" or "slide"
             (windows.source_frames).

@@ -200,9 +200,6 @@ class Bars:
             spread: A function that turns bars of filmed frames (L,) into bars of moments (L · steps,) (Shutter.spread).
                 It is applied before displacement, which so can open moments between filmed frames. By default, bars
                 stay those of filmed frames.
-
-        Returns:
-            The bars that `spread` makes.
         """
         if not self.keys:
             return spread(self.channel.at(frame))
