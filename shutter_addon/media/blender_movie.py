@@ -158,7 +158,7 @@ def _answer(wanted: dict) -> tuple[dict, np.ndarray | None] | None:
 
 @contextmanager
 def _killed_after(seconds: float, process: subprocess.Popen[bytes]) -> Iterator[None]:
-    """Run a `with` block, and kill the process if the block takes longer. Reading from a pipe has no timeout."""
+    """Kill the process if a `with` block takes longer than `seconds`. Reading from a pipe has no timeout."""
     ended = threading.Event()
 
     def watch() -> None:

@@ -248,10 +248,7 @@ class ShotSource(SourceWrapper):
         return as_rgba(self.decoded(index))
 
     def decoded(self, index: int) -> Decoded:
-        """Return a frame in its fastest form (FrameSource.decoded).
-
-        One that was read to find cuts is not decoded again.
-        """
+        """Return a frame in its fastest form (FrameSource.decoded). One read to find cuts is not decoded again."""
         frame = self._handed.pop(index, None)
         return self._source.decoded(index) if frame is None else frame
 
@@ -259,8 +256,9 @@ class ShotSource(SourceWrapper):
         """Return the frames of the shot around a frame, between the cuts found in `low` … `high` (ShotFinder.around).
 
         On a side without a cut, the shot extends to the clip's start or end. With `known`, only cuts that earlier calls
-        found count, and nothing is read. Otherwise, this reads filmed frames that have no signature yet, in ascending
-        order: those from `low` to the first cut after `index`, and NEIGHBOURS frames on each side of a possible cut.
+        found count, and nothing is read. Otherwise, this reads filmed frames that have no signature yet: in ascending
+        order those from `low` to the first cut after `index`, or to `high`; and NEIGHBOURS frames on each side of a
+        possible cut, some of which may be before `low` or after `high`.
         """
         if known:
             return self._shot(index, low, high, self._cuts.get)
@@ -284,7 +282,7 @@ class ShotSource(SourceWrapper):
         return range(first, self.count)
 
     def lacking(self, index: int, low: int, high: int) -> set[int]:
-        """Return the frames that `around` will read for the same arguments, apart from those around possible cuts."""
+        """Return the frames that `around` would read for the same arguments if no new cut seemed possible there."""
         stop = min(high + 1, self.around(index, low, high, known=True).stop)
         unknown = [i for i in self._after(low, stop - 1) if i not in self._cuts]
         return {j * self.step for i in unknown for j in (i - 1, i) if j not in self._signatures}

@@ -67,7 +67,8 @@ class FrameReader:
         """Open the file again, and return it and its first frame.
 
         Raises:
-            MediaError: No frame can be decoded.
+            MediaError: It has no such video stream, or no frame can be decoded.
+            av.error.FFmpegError: It cannot be opened.
         """
         run = self._restart()
         if run.shown is None:
@@ -256,7 +257,7 @@ class _Run:
         self.next = next(self._frames, None)
 
     def cut_off(self) -> bool:
-        """Return whether the file was found to be damaged, or to end before the end that its header declares."""
+        """Return whether reading the file failed, or ended over MISSING seconds before the end its header declares."""
         container = self.file.container
         if self._broken or not self._ended or container.duration is None:
             return self._broken

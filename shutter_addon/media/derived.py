@@ -39,15 +39,14 @@ _SHAPE = "roi", "roi_full", "channelnames", "format", "channelformats", "deep"
 def identity(source: FrameSource) -> dict:
     """Describe footage by the content of its files and the way they are read, but not by their names or folders.
 
-    Files made from the footage are named after this description, so they are found again after the footage has moved.
-    Of a file with more than WHOLE bytes, only the size and some blocks count, so a change elsewhere in it goes
-    unnoticed.
+    Its `key` names the folder of files made from the footage, so they are found again after the footage has moved. Of a
+    file with more than WHOLE bytes, only the size and some blocks count, so a change elsewhere in it goes unnoticed.
 
     Returns:
-        Values that JSON can store, as part of an argument for `key`.
+        Values that JSON can store, an argument for `key`.
 
     Raises:
-        MediaError: A file is gone.
+        MediaError: A file is missing or cannot be read.
     """
     content = hashlib.sha256()
     for path in source.files:
@@ -90,13 +89,12 @@ def content_digest(path: Path, whole: int = WHOLE) -> bytes:
 def _hash(path: Path, size: int, _mtime: int, whole: int) -> bytes:
     """Return the SHA-256 of a file's content or, above `whole` bytes, of its size and of blocks spread over it.
 
-    Results are cached by all arguments. So a file whose size and time of change are the same as before is not read
-    again.
+    Results are cached: a file is read again only if its size or the time of its last change differs.
 
     Args:
         path: The file.
         size: Its size in bytes.
-        _mtime: The time of its last change in nanoseconds. It only tells cached results apart.
+        _mtime: The time of its last change in nanoseconds.
         whole: The most bytes of a file that is hashed completely.
     """
     with path.open("rb") as file:
@@ -193,8 +191,7 @@ class StoredVectors:
 
         Args:
             folder: The folder, which need not exist yet.
-            writes: Whether flow that had to be computed is also written there. A failure to write is no error; nothing
-                more is written after it. False: only existing files are read.
+            writes: Whether computed flow is written there. A failure is no error, but nothing more is written after it.
         """
         self._folder, self._writes = folder, writes
         self._is_new = True  # nothing was written yet

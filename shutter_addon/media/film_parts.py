@@ -30,8 +30,8 @@ def write_part(path: Path, pictures: Iterable[np.ndarray], fps: Fraction) -> Non
 
     Args:
         path: The movie.
-        pictures: sRGB values (H, W, 3 or 4) uint8, all of one size; alpha is ignored. Of its errors, OSError,
-            ValueError, IndexError and OverflowError become a MediaError; all others are passed on.
+        pictures: sRGB values (H, W, 3 or 4) uint8, all of one size; alpha is ignored. If iterating raises OSError,
+            ValueError, IndexError, OverflowError or an error of FFmpeg, it becomes a MediaError. Others are passed on.
         fps: The frame rate.
 
     Raises:

@@ -133,7 +133,7 @@ class Between:
     def _light(self, vectors: np.ndarray, key: int) -> np.ndarray:
         """Return the picture of a key moment in linear light, (H, W, 3 or 4) float32, premultiplied.
 
-        Key moments are those that are made from both frames; other moments are mixes of two key moments.
+        Key moments between the frames are made from both; other moments are mixes of two key moments.
 
         Args:
             vectors: Moment.vectors, whose length is keys − 1.

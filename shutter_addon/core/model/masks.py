@@ -144,7 +144,7 @@ def _outlines(spline: MaskSpline, width: int, height: int) -> tuple[np.ndarray, 
 def _steps(spline: MaskSpline, points: np.ndarray, weights: np.ndarray, larger: int) -> int:
     """Return into how many straight pieces each segment of a spline is divided, the same number for all: 4 to 32.
 
-    It is one for every 4 pixels of the longest segment, and more if the feather's width changes quickly somewhere.
+    It is one for every 4 pixels of the longest segment, and more if feather points change the feather's width quickly.
 
     Args:
         spline: The spline.

@@ -91,7 +91,7 @@ class Ramp:
 
     A linear ramp rises from left to right; its start and end lie at the picture's outermost corners, at any rotation. A
     radial one rises from the center to 1 at the corners. An angle ramp rises clockwise from the top, once around the
-    center, and jumps from 1 to 0 there. All this is before `placed` moves and scales the ramp.
+    center, and jumps from 1 to 0 there. All this is before `placed` moves, turns and scales the ramp.
 
     Attributes:
         kind: The ramp's shape: "linear", "radial" or "angle".
@@ -146,9 +146,9 @@ class Matte:
     Attributes:
         shutter: The index of the shutter.
         content: What gives a value 0 to 1 for each pixel: a file's frame, a ramp, an outline or a mask.
-        blend: With v the value after inversion and opacity, "over": a pixel gets the share v of the shutter, and all
-            its other shutters are reduced by the factor 1 − v. "add": the share v is taken from the default shutter
-            only, at most what is left of that, so that mattes which add up to 1 can lie side by side.
+        blend: With v the value after inversion and opacity, "over": a pixel's shares of all shutters are reduced by the
+            factor 1 − v, and v is added to this shutter's. "add": the share v is taken from the default shutter only,
+            at most what is left of that, so that mattes which add up to 1 can lie side by side.
         opacity: 0 to 1, a factor for the values, after inversion.
         feather: The width to which hard edges are blurred, as a fraction of the picture's height.
         invert: Whether each value v becomes 1 − v.

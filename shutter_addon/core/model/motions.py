@@ -127,7 +127,7 @@ def carried(placement: Placement, motion: Similarity, before: np.ndarray, after:
 def motion_between(
     first: Placement, second: Placement, before: np.ndarray, after: np.ndarray, size: Size
 ) -> Similarity:
-    """Return the motion of the picture that takes a shape from one placement to another, as `carried` does in reverse.
+    """Return the motion of the picture with which `carried` takes a shape from one placement to another.
 
     Args:
         first, second: The shape's placements at the motion's start and end.
@@ -170,11 +170,11 @@ def averaged(placements: Sequence[Placement], weights: np.ndarray) -> Placement:
 def thinned(
     placements: Placements, points: np.ndarray, size: Size, kept: Collection[float] = (), tolerance: float = 1.0
 ) -> list[int]:
-    """Return the frames, ascending, at which a shape's motion needs keys, so that it has as few as needed.
+    """Return the frames, ascending, at which a shape's motion needs keys, so that it has few.
 
-    Placements are interpolated linearly between keys. No point of the shape then is off by more than the tolerance. A
-    span that is too far off gets a key at its worst frame (Ramer, Douglas, Peucker). The first and last frame always
-    are keys.
+    With placements interpolated linearly between keys, no point of the shape is off by more than the tolerance. A span
+    that is too far off gets a key at its worst frame (Ramer, Douglas, Peucker). The first and last frame are always
+    keys.
 
     Args:
         placements: The shape's placement at each frame.
@@ -223,7 +223,7 @@ def _distances(frames: np.ndarray, numbers: np.ndarray, points: np.ndarray, size
     Args:
         frames: The frames (f,), ascending, at least 2.
         numbers: The true placements (f, 4) at these frames, as from `as_array`.
-        points: The shape's points, complex numbers x + iy in pixels relative to its center.
+        points: The shape's points, complex numbers x + iy in pixels relative to its center, y up, unlike Similarity.
         size: Width and height of the picture, in pixels.
 
     Returns:

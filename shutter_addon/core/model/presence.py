@@ -69,9 +69,9 @@ def keys(
     The value fades to 0 before each gap and back to 1 after it. An end without limit (see Gap) has no fade.
 
     Args:
-        seen: Frames in which the subject was found. A gap lasts from a stop to the nearest such frame in the direction
-            of tracking. If the stop itself is one, since another track found the subject there, the gap is that frame
-            only.
+        seen: Frames in which the subject was found. A gap lasts from a stop until just before the nearest such frame in
+            the direction of tracking. If the stop itself is one, since another track found the subject there, the gap
+            is that frame only.
         stops: Where tracking stopped. Without any, there are no gaps and no keys.
         kept: Frames outside the gaps that have the value 1. They shorten fades that would reach beyond them.
         fade: The length of a fade, in frames. Between two gaps it is at most half their distance. At a cut there is a
@@ -121,8 +121,8 @@ def gaps(seen: Collection[int], stops: Iterable[Stop], beside: int = 0) -> list[
 def _gap(seen: Collection[int], stop: Stop) -> Gap:
     """Return the span without the subject at a stop: from there on if tracking went forward, up to there if backward.
 
-    It ends at the nearest frame of `seen` in that direction, or has no end (∞ or −∞). If the stop is at a frame of
-    `seen`, the span is that frame only.
+    It ends just before the nearest frame of `seen` in that direction, or has no end (∞ or −∞). If the stop is at a
+    frame of `seen`, the span is that frame only.
 
     Args:
         seen: Frames in which the subject was found.

@@ -141,8 +141,7 @@ def taken_back(
 class Drawings:
     """What is drawn of a region over time, before the keys of the region's placement move it.
 
-    A drawing is a list of strokes (n, 2) at a frame. Between two drawings, strokes change gradually from one to the
-    other.
+    A drawing is a list of strokes (n, 2) at a frame. Between two drawings, strokes change as `eases` says.
 
     Attributes:
         name: The region's name, for error messages.

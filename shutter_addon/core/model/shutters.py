@@ -258,9 +258,9 @@ def smoothed(bars: ArrayLike, steps: int, *, backward: bool = False, level: bool
         bars: (L,).
         steps: Moments per filmed frame, 1 or an even number.
         backward: Whether the footage plays backward. A filmed frame then is the last of its moments, not the first.
-        level: Whether bars are heights instead of amounts of light: moments next to a filmed frame are as high as its
-            bar, and one in the middle of two frames is as high as the mean of both. This is for the lightest or darkest
-            of all moments. Otherwise, each bar's moments add up to the bar.
+        level: Whether bars are heights instead of amounts of light: up to a common factor, moments next to a filmed
+            frame are as high as its bar, and one in the middle of two frames as the mean of both. This is for the
+            lightest or darkest of all moments. Otherwise, each bar's moments add up to the bar.
 
     Returns:
         The moments' bars (L · steps,), with the sum of `bars` in either case. Filmed frame k is moment k · steps;
@@ -333,8 +333,8 @@ def filmed(moments: ArrayLike, steps: int, position: str, spread: Callable[[np.n
         spread: Turns bars of filmed frames (L,) into the bars of moments (L · steps,) that they now expose.
 
     Returns:
-        New bars that `spread` turns into the old moments again, if any are found. Otherwise each new bar is the mean of
-        its frame's moments, and `lost` says where that differs.
+        New bars that `spread` turns into the old moments / `steps`, if any are found. Otherwise each new bar is the
+        mean of its frame's moments, and `lost` says where that differs.
     """
     moments = np.asarray(moments, dtype=np.float64)
     lacking = -len(moments) % steps

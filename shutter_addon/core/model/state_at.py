@@ -77,8 +77,8 @@ def state_at(effect: Effect, clip: Clip, frame: float) -> Moment:
 def _in_moments(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameState:
     """Return the state with its bars and window in moments: filmed frames, and those that are made between them.
 
-    Options.window and Options.step count moments then. Bars that only give an exposure's shape are spread evenly over
-    their moments, so that the shape stays.
+    Options.window then counts moments; Options.step and `backward` are set. Bars that only give an exposure's shape are
+    spread evenly over their moments, so that the shape stays.
 
     Args:
         effect: The effect.
@@ -424,13 +424,11 @@ def travelled(places: np.ndarray) -> np.ndarray:
 
 
 def shortened(bars: np.ndarray, share: float, shown: float) -> np.ndarray:
-    """Return bars (L,) whose open part is shortened to a share of its time. Shape and sum stay.
-
-    It shrinks towards the shown frame, and lasts for at least one frame.
+    """Return bars (L,) whose open part is shortened towards the shown frame. Shape and sum stay.
 
     Args:
         bars: (L,).
-        share: 0 to 1; at 0 the open part lasts for one frame, at 1 it keeps its length.
+        share: 0 to 1, how much stays of the open part's length beyond one frame: at 0 the part lasts for one frame.
         shown: The middle of the shown frame's bar, as a time in 0 … L. If the frame lies outside the open part, the
             nearest end of that takes its place.
     """
@@ -450,8 +448,9 @@ def with_length(bars: np.ndarray, way: np.ndarray, length: float, shown: float) 
         bars: (L,).
         way: How far the thing has moved by the boundaries of the bars, (L + 1,), from `travelled`.
         length: The distance, in the same unit.
-        shown: The time, in 0 … L, of the shown frame's middle: it keeps its relative place in the open part. An open
-            part that reaches one end of the window grows only towards the other end.
+        shown: The time, in 0 … L, of the shown frame's middle: it keeps its relative place in the open part. If it lies
+            outside, the nearest end of that takes its place. An open part that reaches one end of the window grows only
+            towards the other end.
     """
     bars = np.where(shutters.are_open(bars), bars, 0)
     first, last = shutters.open_span(bars)

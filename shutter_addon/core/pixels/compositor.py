@@ -147,8 +147,8 @@ def median(samples: Sequence[Sample]) -> np.ndarray:
 def weighted_median(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Return the weighted median (…) of values along the first axis.
 
-    It is the lowest value at which the weights of all values up to it reach half of the total. If their sum is within
-    MIDDLE of half, the median is a mix of this value and the next higher one, in equal parts at exactly half.
+    It is the lowest value at which the share of all values up to it in the total weight reaches 0.5 − MIDDLE. If this
+    share is below 0.5 + MIDDLE, it is a mix of that value and the next higher one, in equal parts at exactly 0.5.
 
     Args:
         values: (L, …), in any order.
@@ -291,8 +291,8 @@ def _samples(
 ) -> list[Sample]:
     """Return a Sample for each frame that is present and has a weight at some pixel.
 
-    The shown frame is included in any case if there is a threshold and it is present. If shutters follow different
-    motions, a pixel sees a frame in several places; these are averaged with the shutters' weights.
+    The shown frame is included in any case if there is a threshold and it is present. With value interpolation, a pixel
+    sees a frame at the place of each shutter's motion; what it sees is averaged with the shutters' weights.
 
     Args:
         combine: How frames are combined.
@@ -402,7 +402,7 @@ def _without_absent(q: np.ndarray, parts: np.ndarray, present: np.ndarray) -> np
     Args:
         q: The weights of all frames, (M, H, W, L), for M motions. They add up to 1 over M and L.
         parts: How M motions share the light, (M, H, W), with the sum 1. It is used where no present frame has a weight:
-            then the frame nearest to the exposure's middle gets these weights.
+            then the present frame nearest to the exposure's middle gets these weights.
         present: (L,) bool, False for absent frames.
     """
     if present.all():

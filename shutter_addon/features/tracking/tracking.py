@@ -70,8 +70,8 @@ class Tracked:
     Attributes:
         frame: Timeline frame.
         placement: Location, rotation and scale; with a fault, those of the last frame found before.
-        confidence: How sure the placement is, 0 to 1. 0 is a guess between frames in which it was found, or a fault.
-        fault: "": none. Otherwise why tracking stopped before this frame (in its direction), which gets no keyframe.
+        confidence: How sure the placement is, 0 to 1; 0 for a fault, and for a guess between frames where it was found.
+        fault: "": none. Otherwise why tracking stopped before this frame (in its direction); no keyframe is made of it.
     """
 
     frame: int
@@ -81,7 +81,7 @@ class Tracked:
 
 
 class FoundMotion(NamedTuple):
-    """A motion that was found, from the picture where tracking began to another one.
+    """A motion that was found, from one picture, mostly that where tracking began, to another one.
 
     Attributes:
         motion: The motion.
@@ -146,9 +146,9 @@ class PartTracker:
     def _trusted(self, picture: np.ndarray, sighting: FoundMotion, goes_on: bool) -> float:
         """Return how sure it is that what was found is still the part, 0 to 1.
 
-        This is the trust of the picture before (0 if the part was not found there), times the result of `_held`. If
-        that is 1 or None, it rises to the confidence of what was found; but not if the part was lost or unsure, and
-        something else in the picture looks like it, too.
+        This is the trust of the picture before (0 if the part was not found there), times _KEPT and the result of
+        `_held` (_UNTRACED for None). If that is 1 or None, it rises to the confidence of what was found; but not from
+        below SURE to SURE or more, if something else in the picture looks like the part, too.
 
         Args:
             sighting: What was found in the picture.
@@ -162,7 +162,7 @@ class PartTracker:
         return kept if was_lost and self._first.lookalike(picture, sighting.motion) else sighting.confidence
 
     def _held(self, picture: np.ndarray, sighting: FoundMotion) -> float | None:
-        """Return how far the found corners come from the part, 0 to 1; None: too few can be traced back.
+        """Return how well the found corners lead back to the part, 0 to 1; None: too few can be traced back.
 
         They are traced back some pictures by optical flow. If tracking slipped onto something else, they are not at the
         part's place there. The result is the share that is, divided by _AGREEING; at most 1.
@@ -250,7 +250,7 @@ class _Look:
         If its corners do not agree on a motion of the wanted kind, only its location is found, with less confidence.
 
         Args:
-            guess: The motion to expect, from the picture where tracking began, as that of the result.
+            guess: The motion to expect, from the picture where tracking began to this one.
             motion: What changes, as in Track.follow.
         """
         guess = guess.after(self.motion.inverse())
@@ -265,8 +265,8 @@ class _Look:
 def confidence(match: Match | None, picture: np.ndarray) -> float:
     """Return how sure a match is, 0 to 1; 0 if the match is None.
 
-    It depends on its expected error, on how many corners agree, and on how alike the pixels are. The more alike they
-    are, the fewer corners have to agree.
+    It depends on its expected error, on how many corners are inside the picture and how many of these agree, and on how
+    alike the pixels are. The more alike they are, the fewer corners have to agree.
 
     Args:
         picture: In which the part was found; gives the scale of errors.
@@ -438,7 +438,7 @@ class Track(ABC):
     def _bridged(self, last: Tracked, seen: Tracked, lost: list[int]) -> Iterator[Tracked]:
         """Yield guessed placements of frames where the subject was not found, with the confidence 0.
 
-        Location, rotation and scale are interpolated linearly in time. The subject's middle moves on a straight line.
+        Rotation, scale and the place of the subject's middle are interpolated linearly in time.
 
         Args:
             last: The subject in the last frame before them.
