@@ -18,7 +18,8 @@ class Revision:
 
     Attributes:
         number: How many changes were counted. While it stays the same, the edit's data are the same, as far as Blender
-            reports changes. A new current frame does not count as one, and neither do strokes or files on disk.
+            reports changes. A new current frame is none. Strokes and files on disk count only once the extension
+            notices that they differ, or if it draws the strokes itself.
         replaced: How often Blender's data was replaced as a whole, by undo or by loading a file.
     """
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 
 class StoppedError(Exception):
-    """Raised by `check` where work is to end: it was cancelled, or the time of its slice is over."""
+    """Raised where work is to end: it was cancelled, its slice is over, or it must not wait for another thread."""
 
 
 def never() -> bool:

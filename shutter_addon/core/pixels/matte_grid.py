@@ -35,9 +35,7 @@ def fitted(values: np.ndarray, width: int, height: int) -> np.ndarray:
 
 
 def feathered(values: np.ndarray, width: float) -> np.ndarray:
-    """Blur a matte with a Gaussian.
-
-    Beyond the matte's edges, the pixels at the edge are repeated.
+    """Blur a matte with a Gaussian. Beyond the matte's edges, the pixels at the edge are repeated.
 
     Args:
         values: The matte (h, w) float32, 0 to 1.
@@ -109,9 +107,7 @@ def _resampled(values: np.ndarray, down: Taps, across: Taps) -> np.ndarray:
 
 
 def blurred(values: np.ndarray, kernel: np.ndarray) -> np.ndarray:
-    """Filter values with a symmetric kernel, vertically and horizontally.
-
-    Beyond the edges, the pixels at the edge are repeated.
+    """Filter values with a symmetric kernel, vertically and horizontally. Beyond the edges, edge pixels are repeated.
 
     Args:
         values: The values (h, w) float32, at most 1.

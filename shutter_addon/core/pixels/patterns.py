@@ -11,7 +11,7 @@ _OFF = 0.3  # keeps pixels' middles off the lines' edges, where rounding would d
 
 
 def marks(index: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Tell which places have ink in a shutter's pattern, which helps those who cannot tell the shutters' colors apart.
+    """Tell which places have ink in a shutter's pattern.
 
     Args:
         index: The shutter's index, from 0. Shutter 0 has no ink at all; patterns repeat after COUNT shutters.

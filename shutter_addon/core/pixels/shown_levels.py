@@ -15,8 +15,8 @@ class Display:
 
     Attributes:
         dither: The intensity of dither (noise against banding) as in Blender's render settings; 0: no noise.
-        transfer: Blender's view transform: converts scene-linear light (any shape, float32) to display code values, of
-            which white is 1 (same shape, float32), element by element.
+        transfer: Converts scene-linear light (any shape, float32) to code values for an sRGB display, as Blender does
+            (same shape, float32; white is 1), element by element.
     """
 
     dither: float
@@ -48,8 +48,7 @@ def _noise(width: int, height: int, dither: float) -> np.ndarray:
         dither: The intensity; 0: zeros are returned.
 
     Returns:
-        Noise (height, width) float32 to add to code values, of which white is 1; the bottom row first. It is cached, so
-        do not modify it.
+        Noise (height, width) float32 to add to code values (white is 1), the bottom row first. Do not modify it.
     """
     if not dither:
         return np.zeros((height, width), np.float32)

@@ -259,7 +259,8 @@ def _region(
         shown: As for `with_keys`.
 
     Returns:
-        The converted region; None if it consists of strokes but has none.
+        The converted region. None: it is drawn, but has no strokes; or it is a subject with neither strokes on it nor
+        outlines.
     """
     said = _said(region, shown) | {"name": name}
     if isinstance(region, MatteRegion) and not isinstance(region, OutlineRegion | SubjectRegion):
@@ -292,8 +293,8 @@ def _moves(moving: Subject, fixed: Mapping[float, Ease], shown: range) -> Moves:
         shown: As for `with_keys`.
 
     Returns:
-        The placement, with frames counted as in a recipe. It has no keys if it never moves anything and `fixed` is
-        empty.
+        The placement, with frames counted as in a recipe. It has no keys if it is constant and moves nothing, and
+        `fixed` is empty.
     """
     keys = []
     for frame, ease in _move_keys(moving, fixed, shown):

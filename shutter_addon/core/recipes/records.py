@@ -137,8 +137,9 @@ class RegionKey(MoveKey):
     """A key of a region's placement over time, in a recipe, that can also have a new drawing of the region.
 
     Attributes:
-        strokes: The strokes that are drawn at the key's frame, lists of points in fractions of the picture, y up; they
-            change gradually to those of the next drawing. None: the key only places the region.
+        strokes: What is drawn at the key's frame, lists of points in fractions of the picture, y up: the strokes or
+            curves of the region until the next drawing, to which `ease` leads; or outlines around a subject. None: the
+            key only places the region.
     """
 
     strokes: list[Stroke] | None = None
@@ -161,8 +162,8 @@ def _record(name: str, kinds: tuple[type, ...], **special: tuple[Any, Any]) -> t
 
     Args:
         name: The class's name.
-        kinds: Classes of the model. The record gets a field for each property they declare; its class attribute `model`
-            is the first of them.
+        kinds: Classes of the model. The record gets a field for each property they declare that has a name in recipes
+            (Field.recipe); its class attribute `model` is the first of them.
         special: Fields that the classes do not declare, or that replace declared ones: (type, default) by name. The
             default MISSING makes a field required.
     """
@@ -406,7 +407,7 @@ def recipe_of(effect: model.Effect) -> dict[str, Any]:
 def _words(kind: type, part: Any) -> dict[str, Any]:
     """Return the declared properties of a part of an effect as fields of a recipe: {name in the recipe: JSON value}.
 
-    A property that recipes write only when needed (Field.told) is left out if it has its default value.
+    Unless Field.told is true, a property is left out if it has the value that a recipe without it means (Field.absent).
 
     Args:
         kind: The class of the model that declares the properties.

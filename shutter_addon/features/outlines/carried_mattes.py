@@ -103,7 +103,7 @@ class CarriedMattes(SourceWrapper):
         return None if near == (None, None) else self._described(self._path(index, *near))
 
     def _described(self, path: Path) -> float | None:
-        """Read the confidence, 0 to 1, from a matte's file; None: it is missing, or not written by this program."""
+        """Read the confidence from a matte's file, 0 to 1, or subject_mattes.GONE; None: it is missing or foreign."""
         if (image := derived.opened(path, self._spec)) is None:
             return None
         with closing(image):
@@ -119,7 +119,7 @@ class CarriedMattes(SourceWrapper):
         Returns:
             Closed curves, each of points (x, y) in fractions of the picture, y up. If the frame has a drawing, its
             curves. Otherwise the contours of the frame's matte or, if no file keeps that yet, curves interpolated
-            linearly between the nearest drawings.
+            linearly between the nearest drawings, or those of the only drawing near enough.
 
         Raises:
             MediaError: OpenCV is missing, or the matte cannot be read.

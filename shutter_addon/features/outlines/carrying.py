@@ -104,8 +104,8 @@ def working_size(width: int, height: int) -> tuple[int, int]:
 def carried(frames: Frames, first: Drawing | None, last: Drawing | None, span: range) -> Iterator[Carried]:
     """Make the mattes of successive frames from the drawings around them, and yield them in order.
 
-    First, all frames from drawing to drawing are read, and the optical flow and colors of their working pictures are
-    held in memory. Then the frames of the span are read again, one for each matte.
+    First, all frames from drawing to drawing, or from the only drawing to the other end of the span, are read, and the
+    optical flow and colors of their working pictures are held in memory. Then the span is read again, frame by frame.
 
     Args:
         frames: A function that reads a frame of the footage as displayed, (H, W, 3) uint8.

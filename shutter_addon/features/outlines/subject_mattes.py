@@ -100,8 +100,8 @@ class Network:
 
         Args:
             picture: The picture, (h, w, 3) uint8.
-            share: The size to which the picture is reduced for the network, as a fraction of the network's usual size.
-                A smaller one is quicker, and gives a coarser answer.
+            share: The size to which the picture is scaled for the network, as a fraction of the network's usual size. A
+                smaller one is quicker, and gives a coarser answer.
 
         Raises:
             MediaError: The network does not take one picture and return one mask.
@@ -161,7 +161,10 @@ def covered(strokes: Sequence[Any], picture: np.ndarray) -> np.ndarray:
 
 
 def found(network: Network, picture: np.ndarray, on: np.ndarray, off: np.ndarray) -> Found | None:
-    """Find the subject under strokes with the network: near the strokes first and, if that is unsure, further around.
+    """Find the subject under strokes with the network.
+
+    It looks around the strokes first (CLOSE) and, if that is unsure, also nearer to them (TIGHT) and in the whole
+    picture.
 
     Args:
         network: The network.
@@ -334,7 +337,7 @@ def _passing(places: carrying.Places, carried: np.ndarray, rest: np.ndarray) -> 
     """Return how sure it is that each pixel moves with the background and not with the subject, (h, w), 0 to 1.
 
     Things that pass the subject are recognized by this, so that they do not become a part of it. If too little of the
-    background is visible, all values are 0.
+    background or of the subject is visible to tell its motion, all values are 0.
 
     Args:
         places: For each pixel, its place in the frame before, (h, w, 2), x and y in pixels.
@@ -399,7 +402,7 @@ class CarriedFile:
     """Everything that the mattes of a tracked outline or a subject are made from, as plain data.
 
     Attributes:
-        footage: The footage.
+        footage: The footage, not opened yet.
         drawings: Pairs of a frame of the footage and the curves drawn there (core.model.outlines), frames ascending.
         folder: Where mattes are kept. If it is None or cannot be written to, they are in a temporary folder, which is
             removed when this program ends.
@@ -539,9 +542,9 @@ class SubjectMattes(CarriedMattes):
     def _first(self, frame: int) -> tuple[np.ndarray, np.ndarray, float]:
         """Make the matte of a keyframe (with strokes or a drawing), at which a chain of mattes begins.
 
-        A drawing is taken as it is. Under strokes, the network looks for the subject; if it finds none, the strokes
-        themselves become the matte, with confidence 0. From a frame that has only strokes on what the subject is not,
-        these are removed from the matte that other keyframes give.
+        A drawing is fitted to the picture's edges, and has confidence 1. Under strokes, the network looks for the
+        subject; if it finds none, the strokes themselves become the matte, with confidence 0. In a frame that has only
+        strokes on what the subject is not, these are removed from the matte that other keyframes give.
 
         Returns:
             The matte, (H, W) float32, 0 to 1; what strokes exclude from it, (h, w) float32 in the working picture, 0 to
@@ -569,8 +572,8 @@ class SubjectMattes(CarriedMattes):
 
         Returns:
             The matte, (H, W) float32, 0 to 1; what strokes exclude from it, carried along, (h, w) float32 in the
-            working picture, 0 to 1; and the confidence, 0 to 1. If a cut lies in between or earlier in the chain, the
-            matte is empty and the confidence is GONE.
+            working picture, 0 to 1; and the confidence, 0 to 1. If a cut lies in between or earlier in the chain, or
+            the file is damaged, the matte is empty, nothing is excluded, and the confidence is GONE.
         """
         path = self._path(before, end, None)
         if (written := self._written) is not None and written[0] == path:
@@ -601,7 +604,7 @@ class SubjectMattes(CarriedMattes):
         return self._before[1:]
 
     def _carried_to(self, frame: int) -> Found:
-        """Return the subject in a frame that has only strokes beside the subject, as it would be without them."""
+        """Return the subject in a frame with only strokes on what it is not, as if there were no such frames."""
         nots = {each: strokes for each, strokes in self._subject.nots.items() if each in self._showing}
         drawings, subject = tuple(self._drawings.items()), replace(self._subject, nots=nots)
         mattes = SubjectMattes(self._source, drawings, self._parent, subject, self._model)

@@ -93,7 +93,10 @@ class _Edge:
     places: list[tuple[float, float]] = field(default_factory=list)
 
     def samples(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """Return the edge's speeds in pixels per frame and leans in pixels per row, (n,) each; None: too few places."""
+        """Return the edge's speeds in pixels per frame and leans in pixels per row; None: it has too few places.
+
+        Both are (k - 2,) for k places, since the first and the last one are left out.
+        """
         if len(self.places) < _SAMPLES + 2:
             return None
         x, lean = np.array(self.places).T

@@ -71,7 +71,7 @@ class Film:
         ]
 
     def is_finished(self) -> bool:
-        """Tell whether the whole film exists as complete files, without decoding pictures."""
+        """Tell whether the whole film exists as complete files. Of each EXR picture, only the last row is decoded."""
         if self.kind == "MOVIE":
             return self.place.is_file() and is_whole_movie(self.place, len(self.frames))
         return all(picture.is_file() and is_whole_picture(picture) for picture in self.pictures)
@@ -91,8 +91,8 @@ def film_of(scene: Scene, effect: PropertyGroup, strip: Strip, kind: Kind, folde
         folder: The folder for the film. None: the folder virtual_shutter_baked beside the .blend file.
 
     Raises:
-        EffectError, MediaError: The strip cannot be baked (see `_check`), or there is no `folder`, and the .blend file
-            was never saved.
+        EffectError, MediaError: The strip cannot be rendered, or not as such a film (see `_check`); or there is no
+            `folder`, and the .blend file was never saved.
     """
     _check(scene, effect, strip, kind)
     if not folder and not bpy.data.filepath:
@@ -117,8 +117,9 @@ def _check(scene: Scene, effect: PropertyGroup, strip: Strip, kind: Kind) -> Non
 
     Raises:
         EffectError: It would not. The strip is retimed, strobed or reversed. Or a movie cannot do it: the package av is
-            missing, Blender uses another color configuration, or the source is transparent or has light above white.
-        MediaError: The source of a movie cannot be read.
+            missing, Blender uses another color configuration, or the source is transparent, has light above white, or
+            was deleted.
+        MediaError: A movie is wanted, and the source cannot be read.
     """
     if getattr(strip, "retiming_keys", ()) or strip.strobe > 1 or strip.use_reverse_frames:
         raise EffectError(
@@ -155,7 +156,7 @@ def render(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film, report
             is there already. It may raise an exception to stop.
 
     Raises:
-        effect_source.FAULTS, OutputError, OSError: The film cannot be made.
+        effect_source.FAULTS, OSError: The film cannot be made.
         InterruptedRenderError: It was stopped by Ctrl-C or a signal.
     """
     if film.kind == "MOVIE" and film.is_finished():
@@ -211,9 +212,6 @@ def _make_movie(film: Film, picture: Picture, fps: Fraction, report: Callable[[]
 def _prepare(place: Path) -> None:
     """Make a folder for a film if it is missing, and remove old temporary folders that killed processes left in it.
 
-    Args:
-        place: The folder.
-
     Raises:
         OSError: It cannot be made, or is a link, which could lead to files of other users.
     """
@@ -264,7 +262,7 @@ class BakeJob:
     process: subprocess.Popen
 
     def done(self) -> int:
-        """Return how many frames the process has finished, as it printed last."""
+        """Return how many frames are finished, also by earlier bakes, as the process printed last; 0: none yet."""
         lines = self._said("out").split("\n")[:-1]
         counts = [line.split()[0] for line in lines[-2:] if line.endswith(f" of {len(self.film.frames)}")]
         return int(counts[-1]) if counts else 0
@@ -340,9 +338,6 @@ def _command(scene: Scene, strip: Strip, film: Film, copy: Path) -> list[str]:
         strip: The effect strip.
         film: What to bake.
         copy: Path of the edit's copy.
-
-    Returns:
-        The program and its arguments.
     """
     program = [sys.executable, "-m", "shutter_addon"]  # with Blender as a library
     if bpy.app.binary_path:

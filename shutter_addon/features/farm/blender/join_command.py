@@ -35,10 +35,9 @@ def run(arguments: Namespace) -> None:
         arguments: The parsed command line (see `add`).
 
     Raises:
-        OutputError, MediaError: Frames are missing, damaged, different or of another edit, or the movie cannot be
-            written.
-        InterruptedRenderError: Stopped by Ctrl-C or TERM.
-        OSError: A folder cannot be read or made.
+        UserError: The edit cannot be opened; a sound is missing; frames are missing, damaged, different or of another
+            edit; or the movie cannot be written. InterruptedRenderError: stopped by Ctrl-C or TERM.
+        OSError: A folder or the job file cannot be read, or a folder or the movie cannot be written.
     """
     scene, frames = command_line.open_edit(arguments.edit, arguments.frames)
     film_output.check_movie(arguments.output, [arguments.edit, *versions.read_files(scene)])
@@ -66,15 +65,11 @@ AT_ONCE = 1000  # pictures per strip: Blender copies all of them for each that i
 def _pictures(folder: Path, frames: range) -> list[Path]:
     """Find the picture file of each frame in a folder. The name of a file is the number of its frame, such as 0012.png.
 
-    Args:
-        folder: The folder.
-        frames: The frames that are needed.
-
     Returns:
         The files, in the order of `frames`.
 
     Raises:
-        OutputError: A frame is missing, or has two files.
+        OutputError: One of `frames` is missing, or a frame has two files.
         OSError: The folder cannot be read.
     """
     pictures: dict[int, Path] = {}
@@ -188,7 +183,7 @@ def _cover_edit(scene: Scene, paths: list[Path], first: RenderedPicture) -> None
 
 
 def _keep_colours(scene: Scene, suffix: str, first: RenderedPicture) -> str | None:
-    """For PNG files, set the scene's view so that the movie keeps their colors, which have the edit's view already.
+    """For PNG files, set the output's view so that the movie keeps their colors, which have the edit's view already.
 
     For EXR files, change nothing: they are scene-linear and get the edit's view.
 

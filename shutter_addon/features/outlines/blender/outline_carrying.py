@@ -114,10 +114,10 @@ def progress() -> tuple[int, int] | None:
 
 
 def note_tracking(say: Callable[[str], None]) -> None:
-    """Start to make the mattes that a preview lacked when it was drawn, and add notes to it: progress and failures.
+    """Start to make the mattes that a preview lacked when it was drawn, and add notes to it: progress and a failure.
 
     If the thread makes mattes of something that the preview does not lack, it is stopped for what is lacking. If
-    several outlines or subjects lack mattes, one begins; the next drawing of a preview asks for the others.
+    several outlines or subjects lack mattes, one begins; the others follow when a preview asks for them after that.
 
     Call this on the main thread after drawing a preview.
 

@@ -68,7 +68,7 @@ def _opened(file: CarriedFile) -> CarriedMattes:
 
 
 def shown_curves(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> outlines.Curves:
-    """Return what `curves_now` returns, for drawing code. The result is cached until something in the file changes."""
+    """Return what `curves_now` returns, for drawing code. It, or the error, is cached until the edit changes."""
     key = effect.scene.session_uid, strip.name, index, scene.frame_current
     return revision.until_change("outline", key, lambda: curves_now(scene, effect, strip, index))
 
@@ -138,8 +138,8 @@ def find_subject(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) 
         Whether the region is a subject now.
 
     Raises:
-        EffectError: There are no strokes.
-        MediaError: The footage or the network cannot be read.
+        EffectError, MediaError: There are no strokes or no source, the footage or the network cannot be read, or OpenCV
+            is missing.
     """
     region, before = effect.regions[index], effect.regions[index].kind
     if before == "OUTLINE":
@@ -297,8 +297,8 @@ def subject_outline(self: Operator, _context: Context, effect: PropertyGroup) ->
 def after_stroke(context: Context, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
     """Look for a subject under the first stroke of a new effect's first region. If there is one, the region becomes it.
 
-    Called after each stroke, when the pen goes up. It does nothing for later strokes, or for other regions. Errors are
-    shown to the user in a popup. Once the region is a subject, further strokes on it mark more of the subject.
+    Called after each stroke, when the pen goes up. It does nothing unless the active region is a line with one stroke
+    that region_edits.first_drawn has marked for it (`finds_subject`). Errors are shown in a popup.
     """
     region = effect.regions[effect.active_region]
     layer = layer_of(effect, region)

@@ -50,7 +50,11 @@ class Repair(NamedTuple):
 
 
 def of(effect: PropertyGroup) -> Repair | None:
-    """Return the rolling shutter repair of an effect, recognized by its ramp and shutters; None: it has none."""
+    """Return the rolling shutter repair of an effect, recognized by its ramp and shutters; None: it has none.
+
+    Raises:
+        EffectError: The length of the effect's window is out of range.
+    """
     if effect.inbetween == "1" or not effect.shutters:
         return None
     default = _moment(effect.shutters[0])
