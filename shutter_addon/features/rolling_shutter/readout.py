@@ -160,7 +160,7 @@ def _follow(edge: _Edge, vectors: np.ndarray, steepness: np.ndarray) -> bool:
 
 
 def _new(seen: list[_Edge], picture: np.ndarray, steepness: np.ndarray) -> list[_Edge]:
-    """Find edges of a picture that do not coincide with known ones, and return them, the longest first.
+    """Find edges of a picture that do not coincide with known ones, and return them, the tallest first.
 
     Args:
         seen: The known edges that are visible in this picture. With the new ones, they are MOST at most.
@@ -202,7 +202,7 @@ def _is_same(edge: _Edge, place: tuple[float, float], other: _Edge) -> bool:
 
 
 def _segments(picture: np.ndarray) -> np.ndarray:
-    """Find nearly upright edges in a picture, the longest first, (n, 4): x and y of their upper and lower ends."""
+    """Find nearly upright edges in a picture, the tallest first, (n, 4): x and y of their upper and lower ends."""
     found = cv2.createLineSegmentDetector().detect(picture)[0]
     if found is None:
         return np.empty((0, 4))
@@ -286,7 +286,7 @@ def _fitted(samples: list[tuple[np.ndarray, np.ndarray]], height: int) -> float:
         height: Number of rows of the pictures.
 
     Raises:
-        ReadoutError: Speeds change too little, or the edges do not agree on one readout time.
+        ReadoutError: Speeds change too little, the edges do not agree on one readout time, or it exceeds _LONGEST.
     """
     speeds, leans = (np.concatenate(part) for part in zip(*samples, strict=True))
     of = np.repeat(np.arange(len(samples)), [len(speed) for speed, _lean in samples])

@@ -50,9 +50,9 @@ _FRAMES = MOST + 2  # frames that are kept: those that say what repeats
 class Repeats:
     """Finds frames of a source that repeat the one before, as in footage that was converted to a higher frame rate.
 
-    Whether a frame repeats depends only on MOST + 1 frames on each side. Frames are read from the source again and
-    again, so it must cache those that were read last. Usually only the neighbors are read; where something seems to
-    repeat, more.
+    Whether a frame repeats depends only on MOST frames on each side. Frames are read from the source again and again,
+    so it must cache those that were read last. Usually only the neighbors are read; where something seems to repeat,
+    more.
     """
 
     def __init__(self, source: FrameSource) -> None:
@@ -129,9 +129,12 @@ class SmoothSource(SourceWrapper):
         Args:
             source: The source. `close` closes it.
             step: Indices from one of its frames to the next, 1 or more; step − 1 moments lie in between.
-            vectors: Finds and stores optical flow, so that it is found only once. None: find it whenever it is needed.
+            vectors: Finds optical flow, unless it is stored. None: find it whenever it is needed.
             skip_repeats: Whether to replace frames that repeat the one before by moments, evenly spaced in time between
                 the frames that differ, so that motion does not stop.
+
+        Raises:
+            MediaError: OpenCV is missing.
         """
         self._recent = lru_cache(_FRAMES)(source.read)
         super().__init__(SourceWrapper(source, self._recent))
@@ -162,11 +165,11 @@ class SmoothSource(SourceWrapper):
         return self._moment((filmed, filmed + 1), number) if number else self._source.read(filmed)
 
     def _moment(self, pair: tuple[int, int], number: int) -> Decoded:
-        """Return a moment between two frames; the nearer frame if they have nothing in common.
+        """Return a moment between two frames; the nearer frame if they are equal or have nothing in common.
 
         Args:
             pair: The two frames of the source, neighbors unless repeated frames between them are skipped.
-            number: Indices from the first of the two frames to the moment, `step` for each frame of the source.
+            number: Index of the moment, counted from that of the first of the two frames.
         """
         steps = (pair[1] - pair[0]) * self.step
 
@@ -192,11 +195,13 @@ def steps_for(source: FrameSource, smooth: int | str, window: int, *, skip_repea
         source: The footage.
         smooth: The option: the number of steps, or "auto": as many as the fastest motion in a few pairs of frames
             needs.
-        window: Frames in the window of the effect's shutters. window · steps must not exceed shutters.MAX_WINDOW.
+        window: Frames in the window of the effect's shutters. It limits the result: window · steps does not exceed
+            shutters.MAX_WINDOW (unless `window` alone does).
         skip_repeats: Whether repeated frames are replaced by moments, as in SmoothSource.
 
     Returns:
-        A number of SMOOTH; 1: no moments. It is less than `smooth` or than needed if the window allows no more.
+        A number of SMOOTH; 1: no moments. It is less than `smooth` or than needed if the window or SMOOTH allows no
+        more. For "auto", it is 1 if the motion is not found, as without OpenCV.
     """
     most = max(count for count in SMOOTH if count * window <= max(MAX_WINDOW, window))
     if smooth != "auto":

@@ -54,9 +54,8 @@ class CameraTrack(tracking.Track):
     def _onward(self, start: int, frames: range) -> Iterator[Tracked]:
         """Yield where the camera is at frames on one side of `start`, also beyond cuts and failures.
 
-        After these, tracking begins again with the last placement, at the first frame that can be compared with the
-        next one. A Tracked with a fault marks the place, unless tracking goes on right after a cut: no exposure goes
-        across cuts.
+        After these, tracking begins again with the last placement, at the frame that `_next_begin` finds. A Tracked
+        with a fault marks the place, unless tracking goes on right after a cut: no exposure goes across cuts.
         """
         last, fault = Tracked(frame=start, placement=self._placement(start), confidence=1.0), None
         for tracked in self._from(start, frames):

@@ -146,7 +146,7 @@ class _Pursuit:
 def moved(
     first: np.ndarray, second: np.ndarray, before: np.ndarray, after: np.ndarray, motion: Motion
 ) -> FoundMotion | None:
-    """Find the motion of what a matte covers from one picture to another; None: too few points agree on one.
+    """Find the motion of what a matte covers from one picture to another.
 
     Args:
         first: Grey picture, (H, W) uint8.
@@ -154,6 +154,9 @@ def moved(
         before: The matte of `first`, (H, W) float32, 0 to 1.
         after: The matte of `second`, (H, W) float32, 0 to 1.
         motion: What may change, one of registration.MOTIONS.
+
+    Returns:
+        None if nothing or too small a part of the picture is covered, or if too few points agree on a motion.
     """
     unit, box = max(first.shape) / 640, box_around(np.maximum(before, after), _AROUND)
     if box is None:

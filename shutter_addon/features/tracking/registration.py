@@ -121,7 +121,8 @@ class Part:
 
         Args:
             picture: (H, W) uint8.
-            known: Motion from the part's own picture to the place around which to search. Rotation and scale stay so.
+            known: Motion from the part's own picture to the place around which to search, with the result's rotation
+                and scale.
             radius: How far from there to search, in pixels.
 
         Returns:
@@ -216,7 +217,7 @@ class Part:
         return Part(picture, weight) if (weight > 0).any() else None
 
     def learn(self, match: Match) -> None:
-        """Raise the weights of corners that moved with the part in a match, and lower those of other seen corners."""
+        """Lower the weights of seen corners that did not move with the part in a match; restore those that did."""
         wanted = self._weights * np.where(match.agreeing, 1.0, 0.05)
         self._believed += np.where(match.seen, 0.2 * (wanted - self._believed), 0)
 
@@ -472,7 +473,7 @@ def inside(picture: np.ndarray, points: np.ndarray, margin: float = 0) -> np.nda
 
 
 def matrix(motion: Similarity, origin: complex = 0) -> np.ndarray:
-    """Convert a motion to OpenCV's (2, 3) matrix, for points in a picture that was cropped at the point `origin`."""
+    """Return OpenCV's (2, 3) matrix of a motion, for points relative to `origin`. What they move to is not relative."""
     shift = motion(origin)
     turn = motion.turn
     return np.array([[turn.real, -turn.imag, shift.real], [turn.imag, turn.real, shift.imag]])

@@ -37,9 +37,8 @@ class _Coming:
         since: When the preview last asked for the picture (time.monotonic).
         is_asked: Whether the preview has asked for it since advance_smooth was last called.
         is_seen: Whether the preview had a chance to show the plain picture first.
-        is_over: Whether nothing is left to do: the picture is ready, or cannot be made.
-        is_alone: Whether the device has no room for the frames of both pictures. Then only the smooth one is drawn from
-            then on.
+        is_over: Whether nothing is left to do: the preview can draw the picture itself, or it cannot be made.
+        is_alone: Whether the device has no room for the frames of both pictures, so that only the smooth one is drawn.
         made: Key of the request whose picture is ready; None: none is.
         fault: The error because of which the picture cannot be made; None: no error.
         slices: The time slices in which the picture is composed, piece by piece.
@@ -88,10 +87,14 @@ class _Coming:
         The first call does nothing, so that the preview can show the plain picture first.
 
         Args:
-            seconds: How long composing may take. A slice may be longer than the last one, so that all work ends.
+            seconds: How long composing takes in a slice, at least; half of it in the first one. Slices grow, so that
+                all work ends.
 
         Returns:
-            In how many seconds to redraw the preview, which then goes on; 0: at once.
+            In how many seconds to redraw the preview, which then asks for the picture again; 0: at once.
+
+        Raises:
+            FAULTS: The picture cannot be made.
         """
         render, snapshot, frame, detail = self.asked
         if not self.is_seen:
@@ -156,8 +159,8 @@ def smooth_request(render: RenderContext, snapshot: Snapshot, frame: float, deta
 def advance_smooth(seconds: float) -> None:
     """Go on making the pictures with moments between frames that previews have asked for since the last call.
 
-    This works on each picture for some seconds and has previews drawn again, which ask for it again. A picture that no
-    preview has asked for during _UNSEEN seconds is dropped.
+    This works on each picture for a slice of time, and has previews drawn again, which ask for it again. A picture that
+    no preview has asked for during _UNSEEN seconds is dropped.
 
     Args:
         seconds: How long to compose each picture, roughly.

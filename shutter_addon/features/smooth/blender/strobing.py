@@ -69,8 +69,8 @@ def look(effect: PropertyGroup, snapshot: Snapshot, renderer: Renderer, request:
     This never waits: if the motion is not known yet, it is noted as the next one to measure (`advance` does so).
 
     Returns:
-        The step from one exposed frame to the next, in pixels of the picture. None: it is small enough for a streak, or
-        not known yet, or *Smooth* is on.
+        The step from one exposed frame to the next, in pixels of the picture. None: it is small enough for a streak, it
+        is not known yet or cannot be found, or *Smooth* is on.
         Whether something is new: the step, or whether the source repeats frames, differs from what the last call for
         this effect found. A step found at another timeline frame counts as None.
     """
@@ -177,7 +177,8 @@ def note_streaks(
 ) -> None:
     """Add a note to a preview if the exposure has too few frames. Unknown motion is measured once the playhead rests.
 
-    Called while a preview is drawn. When a measurement has finished, previews and panels are drawn again.
+    Called while a preview is drawn. When a measurement has finished, previews are drawn again; if it changed what
+    `look` returns, so are panels.
 
     Args:
         say: A function that adds a note to the preview.

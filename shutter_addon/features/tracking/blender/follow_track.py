@@ -27,7 +27,7 @@ Point = tuple[str, np.ndarray, np.ndarray]  # see _markers
 
 
 def follow(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> None:
-    """Make a region follow a movie clip's track: insert keyframes of its motion wherever the track is known.
+    """Make a region follow a movie clip's track: insert the keyframes that its motion needs where the track is known.
 
     The region's place at the current frame and at keyframes that the user made stays; between these, motion from both
     is blended. Notes of where an earlier tracking of the region stopped are removed.
@@ -122,8 +122,8 @@ def _points(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, start
         By timeline frame, then by the point's name: its place in pixels, x + iy. Frames without any point are left out.
 
     Raises:
-        EffectError, MediaError: There are no points at `start`, the region's motion cannot be keyed, the region has no
-            strokes, or the strip does not show the clip's footage.
+        EffectError, MediaError: There is no such clip or track, or none of its points at `start`; the region's motion
+            cannot be keyed; it lacks strokes at one of the frames; or the strip does not show the clip's footage.
     """
     region = effect.regions[index]
     validation.check_moving(region)
@@ -226,8 +226,7 @@ def _followed(
         Args:
             origin: A timeline frame where the placement is known.
             frame: The timeline frame.
-            near: The placement at a neighboring frame. The result's rotation continues it without a jump by whole
-                turns.
+            near: The placement found last. The result's rotation continues it without a jump by whole turns.
         """
         if (motion := moves[origin].get(frame)) is None:
             return None
@@ -264,7 +263,7 @@ def _motions(points: dict[int, Points], origin: int) -> Motions:
         origin: The timeline frame at which motion begins.
 
     Returns:
-        The motion by timeline frame. Frames to which none is found are left out.
+        The motion by timeline frame, `origin` included. Frames to which none is found are left out.
     """
     by_frame = {origin: Similarity()}
     enough = min(2, len(points[origin]))

@@ -60,7 +60,7 @@ def track(
     """Track a region or the camera from the current frame, and key each frame.
 
     At the end, keyframes that the motion does not need are removed, unless `track_all_keys` is on. Closing
-    the generator early keeps the frames tracked so far. It ends if the user deletes the region.
+    the generator early keeps the frames tracked so far. It ends if the region is gone (selection.Target.effect).
 
     Args:
         index: Of the region; None: the camera.
@@ -68,7 +68,7 @@ def track(
         patience: Seconds after which None is yielded while no frame is ready; None: wait.
 
     Yields:
-        Each timeline frame after it is keyed; twice on the way to a keyframe of the user's own.
+        Each timeline frame after it is keyed; mostly twice on the way to a keyframe of the user's own.
 
     Raises:
         EffectError, MediaError: It cannot be tracked. If no frame has been yielded, nothing has changed.
@@ -312,6 +312,9 @@ def panning_shot(effect: PropertyGroup, index: int, key: bool = False) -> None:
     Args:
         index: Of the region.
         key: Insert keyframes for the bars.
+
+    Raises:
+        EffectError: The window's length is out of range.
     """
     as_layer(effect, index, "STILL", "ANGLE_360", key)
     region = effect.regions[index]
