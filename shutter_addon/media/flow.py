@@ -86,7 +86,7 @@ class Between:
         """Return one of the moments, which lie at equal distances in time between the two frames.
 
         Its picture is not computed yet; Moment.rgba does that. The picture is a mix of both frames; what only one of
-        them shows is taken from that one.
+        them shows comes mostly from that one (`_late`).
 
         Args:
             pair: The numbers of the two frames, stored in Moment.pair.
@@ -119,7 +119,7 @@ class Between:
         return _decoded(frame, self.ends[0].dtype, self._transfer, self._alpha)
 
     def values(self, moment: Moment, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """Move values, such as mattes, like the frames: from both frames' (H, W) float32, return those at a moment."""
+        """Move both frames' values (H, W) float32, such as mattes, by the flow to the key moment nearest a moment."""
         stopping.check()
         (height, width), keys = first.shape, len(moment.vectors) + 1
         key = min(max(round(moment.number * keys / moment.steps), 1), keys - 1)
@@ -205,7 +205,7 @@ def found(first: np.ndarray, second: np.ndarray) -> np.ndarray:
         float16 (⌈H / STEP⌉, ⌈W / STEP⌉, 6). Channels 0 and 1: the vector from a pixel of the first picture to its place
         in the second, x and y in pixels. 2: the vector's cost, which is the difference between the grey values at its
         two ends, on average around it; 0 is best, 255 worst. Channels 3 to 5: the same from the second picture to the
-        first.
+        first. If a side of the pictures is shorter than SMALLEST, all vectors are 0.
     """
     height, width = first.shape
     shape = -(-height // STEP), -(-width // STEP)
@@ -358,7 +358,7 @@ def _carriers(side: np.ndarray) -> _Carriers:
     none arrives.
 
     Args:
-        side: x, y and cost of the vectors, (h, w, 3).
+        side: x, y and cost of the vectors, (h, w, 3) float16.
 
     Returns:
         The vectors' starting places and the vectors, (2, h · w + 1) each, in cells of STEP pixels, and their costs.
@@ -426,7 +426,7 @@ def _mixed(ends: list[np.ndarray], vectors: np.ndarray, key: int, keys: int) -> 
 def _late(sure: np.ndarray, key: int, keys: int) -> np.ndarray:
     """Return the weight (H, W) of the second frame in the mix at a key moment, 0 to 1; the first frame has the rest.
 
-    If both show the pixel equally surely, it is key / keys. If one hides it, the other one gets almost all weight.
+    If both show the pixel equally surely, it is key / keys. If only one shows it, that one counts 21 times.
 
     Args:
         sure: (H, W, 2), 0 to 1: how surely the first frame (0) and the second (1) show what is at a pixel.

@@ -40,7 +40,7 @@ class Footage:
         self._wanted: Sequence[int] = ()
 
     def want(self, frames: Sequence[int]) -> None:
-        """Announce which timeline frames' pictures will be asked for next, in order, to read them in blocks."""
+        """Announce which timeline frames' pictures will be asked for next, in order, so that they can be read early."""
         self._wanted = frames
 
     def picture(self, frame: int) -> np.ndarray:

@@ -71,7 +71,7 @@ class MatteValues:
         return list(self._made)
 
     def _content(self, content: Content, index: int) -> tuple[Hashable, Callable[[], np.ndarray]]:
-        """Return a key of a matte's content at a frame, equal for equal content, and a function that reads it."""
+        """Return a key of a matte's content at a frame (equal keys: equal content), and a function that reads it."""
         if not isinstance(content, FileFrame):
             return content, partial(content.values, *self._size)
         file, late = content.file, self._late

@@ -71,7 +71,8 @@ class MovieSource(FrameSource):
         """Set this source's attributes, such as size, length and dtype, from the movie's header and first frame.
 
         Raises:
-            MediaError: Its length is unknown, or no frame can be decoded.
+            MediaError: It has no such video stream, its length is unknown, or no frame can be decoded.
+            av.error.FFmpegError: It cannot be opened.
         """
         file, first = self._reader.first()
         codec = file.stream.codec_context
@@ -114,7 +115,7 @@ class MovieSource(FrameSource):
         `read` to the bit.
 
         Raises:
-            MediaError: The frame cannot be decoded.
+            MediaError, IndexError: As for FrameSource.read.
         """
         with self._named(index):
             frame = self._frame(index)
@@ -128,7 +129,7 @@ class MovieSource(FrameSource):
 
         Returns:
             Samples of the source's dtype, over the full range. They equal the luminance of RGB. None: the frame may
-            have colors, because its format has chroma that is not neutral, or is RGB.
+            have colors, because its chroma is not neutral, or its format is neither grey nor planar YUV.
         """
         with self._named(index):
             frame = self._frame(index)

@@ -11,7 +11,7 @@ __all__ = ["check", "cv2"]
 
 
 def check(what: str, module: str = "") -> None:
-    """Check that OpenCV and, if named, a contributed module of it can be used. Other add-ons' may lack modules.
+    """Check that OpenCV can be used and, if named, a contributed module, which another add-on's OpenCV may lack.
 
     Args:
         what: The beginning of the message, such as "tracking needs".

@@ -39,16 +39,16 @@ def open_source(
         path: The file. With `files`, it may be their folder.
         stream: Which video stream of a movie, from 0. Cover pictures do not count.
         files: The file names of an image strip, one for each frame, in the folder of `path`. None: a movie, or images
-            whose names have higher numbers than `path`.
+            with numbers from `path` on.
         colorspace: Blender's name of the color space in which the strip's samples are. None: what Blender assumes for
             such a file.
-        config: The OpenColorIO configuration file, needed for color spaces other than sRGB and Linear Rec.709.
+        config: The OpenColorIO configuration file; not needed for sRGB, Linear Rec.709 and Non-Color.
         alpha: The alpha mode of images, "straight" or "premultiplied". None: what Blender assumes.
         deinterlace: Whether to deinterlace a movie, as the option of a movie strip does.
         divisor: The factor by which both sides of frames are reduced, one of reduced.DIVISORS.
 
     Raises:
-        MediaError: The file cannot be read.
+        MediaError: The file cannot be read, or the configuration is missing or lacks the color space.
     """
     path = Path(path)
     source: FrameSource
@@ -130,7 +130,7 @@ class MatteFile:
 
     Attributes:
         path: A movie, a picture, or the first file of an image sequence.
-        channel: "luminance", "red", "green", "blue", "alpha", or the name of a channel in an image file.
+        channel: "luminance", "red", "green", "blue", "alpha", or the name of a channel in an EXR file.
         files: The file names of an image strip, one for each frame. None: a movie, or images with numbers from `path`
             on.
         stream: Which video stream of a movie, from 0.

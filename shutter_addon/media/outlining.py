@@ -93,7 +93,7 @@ def _extent(drawn: np.ndarray) -> int:
 
 
 def traced(matte: np.ndarray, off: float = 0.5) -> Curves:
-    """Trace closed curves around the pixels where a matte is above one half. Spots of at most SPOT pixels are ignored.
+    """Trace closed curves around the pixels where a matte is above one half, but not spots or holes up to SPOT pixels.
 
     Args:
         matte: (height, width) float32, 0 to 1.

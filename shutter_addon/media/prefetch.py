@@ -16,7 +16,8 @@ _PATIENCE = 0.1  # seconds between two looks at whether a frame is still wanted
 class PrefetchSource(SourceWrapper):
     """A wrapper around a source that decodes the frames announced by `want` ahead of time, on a thread of its own.
 
-    A decoded frame stays in memory until a call of `want` no longer names it. Arrays of frames are read-only.
+    An announced frame stays in memory until a call of `want` no longer names it, any other only until it is read.
+    Arrays of frames are read-only.
     """
 
     def __init__(self, source: FrameSource, *, planes: bool = False) -> None:
@@ -24,8 +25,8 @@ class PrefetchSource(SourceWrapper):
 
         Args:
             source: The source.
-            planes: Whether the thread calls the source's `decoded` in place of `read`. Frames may then be planes of
-                luma and chroma (frame_source.Planes), which `decoded` returns and `read` converts to RGBA.
+            planes: Whether the thread calls the source's `decoded` in place of `read`. Frames may then be Planes or
+                Moments (frame_source), which `decoded` returns and `read` converts to RGBA.
         """
         super().__init__(source)
         self._fetch = source.decoded if planes else source.read

@@ -41,7 +41,8 @@ class SequenceSource(FrameSource):
 
     With `files` (an image strip's list), frame i is files[i]. Otherwise files are found beside the first one: frame i
     is the file whose number is i higher. If that is missing, the file with the next lower number is repeated. The
-    sequence ends where more than MISSING numbers in a row are missing; `left_out` then tells so.
+    sequence ends before a gap of more than MISSING numbers, and has at most LONGEST frames. `left_out` tells of files
+    beyond its end.
 
     As in Blender, samples are not converted: straight alpha stays straight, and EXIF orientation is ignored. The
     picture of an EXR is its data window. All frames must have the size and sample type of the first one. The source has
@@ -69,7 +70,7 @@ class SequenceSource(FrameSource):
             path: The first file. With `files`, it may be their folder.
             files: An image strip's list of file names, in the folder of `path`. None: files are found beside `path`.
             alpha: The alpha mode of files that have alpha, "straight" or "premultiplied". None: what Blender assumes.
-            channel: A key of CHANNELS, or the name of a channel in the files. None: all colors.
+            channel: A key of CHANNELS, or the name of a channel in EXR files. None: all colors.
 
         Raises:
             MediaError: The first file cannot be read or has no such channel, its folder cannot be listed, or `files` is
@@ -107,8 +108,8 @@ class SequenceSource(FrameSource):
         """Return a frame as RGBA (height, width, 4), or the samples (height, width, n) of `channel` if one was chosen.
 
         Raises:
-            MediaError: The file is missing or damaged, or its size (without `channel` also its sample type) is not the
-                first's.
+            MediaError: The file is missing, damaged or without the channel, or its size (without `channel` also its
+                sample type) is not the first's.
             IndexError: There is no such frame.
         """
         check_index(self, index)
@@ -226,7 +227,7 @@ def _frame_number(path: Path) -> tuple[_Parts | None, list[Path]]:
 
     Returns:
         The stem before the number, the number's digits, and the stem after them; None: the name has no number. And the
-        files of the folder whose names differ only in this number, the file itself included.
+        files of the folder whose names differ only in this number, the file itself included if it exists.
 
     Raises:
         MediaError: The folder cannot be listed.
@@ -254,10 +255,9 @@ def _numbers(stem: str) -> list[_Parts]:
 
 
 def by_number(path: Path, *, listed: bool = False) -> Callable[[int], Path] | None:
-    """Return a function that returns the path of the sequence's file for a number i, whether or not the file exists.
+    """Return a function of i that returns the path of the file whose number is i higher, whether or not it exists.
 
-    The file's number is that of `path` plus i, with at least as many digits. Return None if `path` has no number in its
-    name.
+    The number has at least as many digits as that of `path`. Return None if the name of `path` has no number.
 
     Args:
         path: A file of the sequence.
@@ -307,7 +307,7 @@ def _first_colours(image: ImageInput, path: Path) -> Layer:
         path: The file, for messages.
 
     Returns:
-        The header of the part (an EXR may have several), and the positions of the channels in it, in the order RGBA.
+        The header of the part (an EXR may have several), and the channels' positions in it: colors, then any alpha.
 
     Raises:
         MediaError: The image has no channels of colors, or an EXR's parts have different data windows.
@@ -334,7 +334,7 @@ def _channel_named(channel: str, image: ImageInput, path: Path) -> Layer:
     "red".
 
     Args:
-        channel: A key of CHANNELS, or the name of a channel in the file.
+        channel: A key of CHANNELS, or the name of a channel in an EXR file.
         image: The opened file. It is left at the part that has these channels.
         path: The file, for messages.
 
@@ -342,7 +342,7 @@ def _channel_named(channel: str, image: ImageInput, path: Path) -> Layer:
         The header of that part, and the positions of the channels in it.
 
     Raises:
-        MediaError: The image has no such channel.
+        MediaError: The image has no such channel. Or as for `_first_colours`.
     """
     names: list[str] = []
     is_exr = image.format_name() == "openexr"
@@ -399,8 +399,7 @@ def _opened(
         layer_of: Returns the wanted channels of the opened image: the header of their part, and their positions in it.
 
     Yields:
-        The opened image; the header of the part; and the channels' positions: those of Y, YA, RGB or RGBA, or of one
-        chosen channel. None of them (an empty list) for the alpha of an opaque image.
+        The opened image, the header of the part, and the channels' positions: [] for the alpha of an opaque image.
 
     Raises:
         MediaError: The image cannot be read.
