@@ -46,7 +46,11 @@ def guiding(index: int, step: int, shot: range) -> tuple[int, ...]:
 
 
 def reach(step: int) -> int:
-    """Return how far the frames of `guiding` are from the shown one at most, in source frames."""
+    """Return how far the frames of `guiding` are from the shown one at most, before or after it, in source frames.
+
+    Args:
+        step: Every step-th source frame was filmed.
+    """
     return BESIDE * step
 
 

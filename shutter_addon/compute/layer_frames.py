@@ -131,13 +131,16 @@ def with_colors(frame: np.ndarray, colors: np.ndarray, where: np.ndarray, source
 
 
 class LayerMattes:
-    """Makes the mattes of layers in source frames, and caches the last ones.
+    """Makes the mattes of layers in source frames, and caches those used last, about KEPT_BYTES.
+
+    A layer is a region that is exposed by itself, in front of the rest (frame_state.Layers).
 
     Args:
         source: The footage.
-        solve: Takes a state from Layers.scribbles and a source frame. Returns the coefficients (N, h, w) float32 that
-            spread from the strokes of drawn layers: 1 + i for layer i, and 0 for what belongs to no layer.
-        reader: Reads the values of the mattes of other layers. None: all layers are drawn with strokes.
+        solve: Takes an item of Layers.scribbles (the strokes of all drawn layers in a source frame) and that frame's
+            number. Spreads the strokes over the picture and returns coefficients (N, h, w) float32: number 1 + i for
+            layer i, and number 0 for what belongs to no layer.
+        reader: Reads the mattes of layers that are not drawn with strokes. None: there are no such layers.
     """
 
     def __init__(
@@ -177,7 +180,7 @@ class LayerMattes:
         return min(max(frame - layers.first, 0), len(layers.mattes) - 1)
 
     def _whole(self, layers: Layers, frame: int, layer: int) -> np.ndarray:
-        """Return the matte (H, W) float32, 0 … 1, of the layer with an index in a source frame, without its opacity."""
+        """Return the matte (H, W) float32, 0 … 1, of the layer with an index in a source frame, as at opacity 1."""
         place = self._place(layers, frame)
         drawn, matte = layers.scribbles[place], layers.mattes[place][layer]
         if matte is not None:

@@ -322,7 +322,7 @@ class Renderer:
         """Announce to the source which frames this picture and the next few will read: it decodes them early.
 
         Returns:
-            The frames that only the next pictures will read, in order. Announce these again once this picture is made:
+            The frames that only the next pictures will read, in order. Announce only these once this picture is made:
             its own frames are on the device by then.
         """
         indices = (request.index + step * request.direction * self.source.step for step in range(_AHEAD + 1))
@@ -334,7 +334,7 @@ class Renderer:
     def _is_guided(self, request: Request) -> bool:
         """Return whether edges in the shown frame affect how much of each shutter a pixel gets.
 
-        They do if scribbles stop at edges, and do not give one shutter to all pixels.
+        They do if scribbles stop at edges, and if they give different shutters to different pixels.
         """
         return request.state.options.edge_aware > 0 and sole_of(self.labels(request)) is None
 

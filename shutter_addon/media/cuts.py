@@ -288,7 +288,7 @@ class ShotSource(SourceWrapper):
         return {j * self.step for i in unknown for j in (i - 1, i) if j not in self._signatures}
 
     def handed(self) -> set[int]:
-        """Return the frames that were read to find cuts and wait for `read`."""
+        """Return the numbers of the frames that were read to find cuts and are kept for the next `read`."""
         return set(self._handed)
 
     def release(self) -> None:

@@ -168,7 +168,12 @@ class FrameReader:
         return self._begin(File(self._container, stream, _decoder(stream, self._threads)), seeking=False)
 
     def _begin(self, file: File, seeking: bool) -> _Run:
-        """Start a decode in place of the last one. `seeking`: it begins after a seek, not at the file's start."""
+        """Close the last decode, and start one from where the file's container stands.
+
+        Args:
+            file: The open file.
+            seeking: Whether the caller has moved the container by a seek, so that it is not at the file's start.
+        """
         if self._run is not None:
             self._run.close()
             self._run = None

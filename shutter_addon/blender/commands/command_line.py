@@ -38,7 +38,11 @@ def to_path(text: str) -> Path:
 
 
 def megabytes(text: str) -> int | None:
-    """Return an option's number of megabytes, as argparse's `type`; None for 0, as if the option were not given."""
+    """Return an option's number of megabytes; None for 0, as if the option were not given. It is argparse's `type`.
+
+    Raises:
+        ArgumentTypeError: The text is not a whole number from 0 on.
+    """
     if not text.isdecimal():
         raise argparse.ArgumentTypeError(f"{text!r} is not a number of megabytes")
     return int(text) or None

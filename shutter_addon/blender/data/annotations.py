@@ -77,7 +77,9 @@ def image_to_region(region: Region) -> np.ndarray:
 
 
 def image_to_picture(strip: Strip, size: tuple[int, int], **moved: float) -> np.ndarray | None:
-    """Return the inverse of the matrix (3, 3) that picture_to_image gives for the same arguments.
+    """Return the matrix (3, 3) from the sequencer's image space, in pixels, to fractions of a strip's picture.
+
+    It is the inverse of what picture_to_image returns for the same arguments, which are explained there.
 
     Returns:
         The matrix. None if the strip is shown so small that a side of its picture has fewer than 4 pixels: strokes

@@ -157,7 +157,12 @@ def _proxy(scene: Scene, effect: PropertyGroup, strip: Strip, space: Space) -> s
 
 
 def _scale(context: Context, scene: Scene, strip: Strip, area: Area) -> float:
-    """Return preview pixels per pixel of the source, by the preview's resolution or the screen's if that is lower."""
+    """Return how many pixels a preview has for a pixel of the effect's picture, as a factor for lengths.
+
+    This is the lower of two scales, both including the strip's transform: that of the image that Blender renders at the
+    preview's resolution setting, and that of the image on the screen, with zoom. With *Live* off, it is the setting
+    alone, as a fraction.
+    """
     space = area.spaces.active
     percent = _PERCENT.get(space.proxy_render_size, scene.render.resolution_percentage)
     size = strip.scene.render.resolution_x, strip.scene.render.resolution_y

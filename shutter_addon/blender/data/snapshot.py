@@ -488,18 +488,19 @@ def _camera(sampling: Sampling) -> model.Camera:
 def recipe_of(scene: Scene, effect: PropertyGroup, strip: Strip, contents: Sequence = ()) -> model.Effect:
     """Return an effect in the form that recipe files have, whose frame 1 is the strip's first frame.
 
-    Regions whose shutter does not exist are left out, and so are scribbles, outlines and subjects of which nothing
-    is drawn (see key_fitting.with_keys).
+    Regions whose shutter does not exist are left out, and so are scribbles, outlines and subjects (what a model
+    finds under strokes) of which nothing is drawn (see key_fitting.with_keys).
 
     Args:
         scene: The scene that has the strip.
         effect: The effect that the strip shows.
         strip: The effect strip.
-        contents: What mattes are in the recipe: one for each matte and ramp that is kept, in the order of the regions.
+        contents: The file or ramp that the recipe names for each matte and ramp region that is not left out, in the
+            order of the regions. It replaces the region's own. The default is for effects without such regions.
 
     Raises:
-        EffectError, MediaError: The effect cannot be rendered as it is, the strip or a key lies beyond the timeline, or
-            the strip is too small to place its strokes.
+        EffectError, MediaError: The effect cannot be rendered as it is, the strip or a key lies beyond
+            limits.MAX_FRAME, or the strip is shown too small for strokes to be placed (annotations.image_to_picture).
     """
     check_counts(effect)
     shown, keyed = range(strip.left_handle, strip.right_handle), _keyed(scene, effect)

@@ -104,7 +104,7 @@ def has_known_levels(scene: Scene) -> bool:
 
 
 def has_animation(scene: Scene, part: str) -> bool:
-    """Tell whether any property of a scene whose data path contains `part` may be animated, by an F-curve or a driver.
+    """Tell whether a scene has an F-curve or a driver for a property whose data path contains `part`.
 
     If the scene has NLA tracks, the answer is always True: they may animate anything.
     """

@@ -23,8 +23,9 @@ def summary(weights: np.ndarray, combine: str = "AVERAGE") -> str:
 
     Args:
         weights: The bars (L,): how much each frame of the window counts.
-        combine: How frames are combined, the first word of an item of choices.COMBINES. "AVERAGE" gives the shutter's
-            angle; for others, the text has the number of frames that are combined in place of the angle.
+        combine: How frames are combined, the identifier of an item of choices.COMBINES. For "AVERAGE", the text has the
+            angle of a rotary shutter with the same light; 360° is the whole window. For others, it has the number of
+            frames that are combined, and no angle.
     """
     if not np.any(weights):
         return iface_("All bars are zero: the shutter never opens")

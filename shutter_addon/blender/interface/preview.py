@@ -272,12 +272,13 @@ def _show_shares(
     """Draw one of the views *Scribbles*, *Mattes* or *Edges* in the shutters' colors.
 
     Args:
-        step: The view, and the pass of shaders/show.glsl that draws it: "SCRIBBLES" (which shutter's strokes cover a
-            pixel), "COEFFICIENTS" (the pixel's share of each shutter) or "EDGES" (lines around areas where a shutter
-            other than the first has more than half).
+        step: The view, and the pass of shaders/show.glsl that draws it. "SCRIBBLES": which shutter's strokes cover a
+            pixel. "COEFFICIENTS" (*Mattes*): the pixel's share of each shutter. "EDGES": lines around areas where a
+            shutter other than the first has more than half.
         colors: The color of each shutter.
-        drawn: The texture with the strokes' shutters or the shares, and the side in pixels of the blocks that share a
-            texel.
+        drawn: A texture, and the side in pixels of the blocks that share one of its texels. For "SCRIBBLES" it has the
+            shutter whose stroke covers a pixel, else the shares.
+        renderer: The renderer of the picture, which tells the picture's size.
         opacity: 0 to 1.
         more: Further uniforms of the pass.
     """

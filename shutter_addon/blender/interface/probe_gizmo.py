@@ -72,7 +72,7 @@ def layout(point: Sequence[float], size: tuple[int, int], count: int, unit: floa
 
 
 def _view(context: Context) -> View | None:
-    """Return where the preview shows the effect's picture; None: it shows no effect, or the matrix has no inverse."""
+    """Return where the preview shows the effect's picture. None: it shows no effect, or View.matrix has no inverse."""
     if (shown := preview_areas.shown(context)) is None:
         return None
     seen = view(shown.effect, shown.strip, context.region)

@@ -261,11 +261,11 @@ def _detail(context: Context, look: Look) -> effect_source.Detail:
     """Return the detail that all previews of a scene share.
 
     The divisor is the one of reduced.DIVISORS that makes the picture about as large as the largest preview. While
-    playing, scrubbing or tracking, and in views without the result, no frames are computed between filmed ones, because
+    playing, scrubbing or tracking, and in views other than RESULTS, no frames are computed between filmed ones, because
     optical flow takes long.
 
     Args:
-        look: How previews show the effect. Without a scale, the detail is full.
+        look: How previews show the effect. If its scale is None (no preview shows it), the detail is that of renders.
     """
     if (scale := look.scale) is None:
         return effect_source.FULL
@@ -331,7 +331,7 @@ def _time_up(context: Context, request: Request) -> Slice:
 def refine() -> None:
     """Work for about 0.15 s on each picture with frames computed between filmed ones, which will replace a plain one.
 
-    While the pen is down, drop this work; while a slow picture is being made, let it rest.
+    While the pen is down, drop what is done so far; while a slow picture is being made, do nothing.
 
     Raises:
         effect_source.FAULTS: A picture cannot be made.

@@ -146,11 +146,13 @@ class Matte:
     Attributes:
         shutter: The index of the shutter.
         content: What gives a value 0 to 1 for each pixel: a file's frame, a ramp, an outline or a mask.
-        blend: With v the value after inversion and opacity, "over": a pixel's shares of all shutters are reduced by the
-            factor 1 − v, and v is added to this shutter's. "add": the share v is taken from the default shutter only,
-            at most what is left of that, so that mattes which add up to 1 can lie side by side.
-        opacity: 0 to 1, a factor for the values, after inversion.
-        feather: The width to which hard edges are blurred, as a fraction of the picture's height.
+        blend: How the matte changes a pixel's shares of the shutters. Its value v is the one after feather, inversion
+            and opacity. "over": all shares are multiplied by 1 − v, then v is added to this shutter's. "add": v is
+            taken from the default shutter's share only, at most what is left of that. So mattes which add up to 1 can
+            lie side by side.
+        opacity: 0 to 1, a factor for the values. It is applied last.
+        feather: How wide a hard edge becomes by blurring, as a fraction of the picture's height. All values are
+            blurred so, before inversion.
         invert: Whether each value v becomes 1 − v.
     """
 

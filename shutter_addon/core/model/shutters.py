@@ -185,15 +185,15 @@ def displace(shutters: ArrayLike, coefficients: ArrayLike) -> np.ndarray:
 
 
 def mix(shutters: ArrayLike, coefficients: ArrayLike) -> np.ndarray:
-    """Interpolate N shutters by value, as a cross-fade between the pictures that they make.
+    """Interpolate N shutters by value: bar by bar. The pictures that they make fade into each other.
 
     Args:
-        shutters: Bars (N, L).
-        coefficients: (…, N), ≥ 0, with the sum 1.
+        shutters: Bars (N, L). No shutter has only zeros.
+        coefficients: How much of each shutter to take, (…, N), ≥ 0, with the sum 1.
 
     Returns:
-        Bars (…, L): the weighted mean of the shutters, each scaled to the sum 1 first, and then scaled to the exposure
-        e(q) = Σ cᵢ eᵢ, as for `displace`.
+        Bars (…, L). Each shutter is scaled to the sum 1, and the weighted mean of these is taken. It is then scaled to
+        the weighted mean of the shutters' exposures (the sums of their bars), as in `displace`.
     """
     shutters = np.atleast_2d(np.asarray(shutters, dtype=np.float64))
     coefficients = np.asarray(coefficients, dtype=np.float64)

@@ -417,5 +417,5 @@ def _without_absent(q: np.ndarray, parts: np.ndarray, present: np.ndarray) -> np
 
 
 def _decode(total: np.ndarray) -> np.ndarray:
-    """Convert premultiplied RGBA (…, 4) of encoded light to linear light."""
+    """Convert premultiplied RGBA (…, 4) from sRGB code values to linear light. Alpha stays."""
     return light.premultiplied(light.straight(total), light.to_linear)

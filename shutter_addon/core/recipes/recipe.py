@@ -29,7 +29,11 @@ def contents(source: Effect) -> list[FileContent]:
 
 
 def relative(path: Path, folder: Path) -> str:
-    """Return the path of a matte file as a recipe in `folder` names it: relative to the folder if that is possible."""
+    """Return the path of a matte file as a recipe in `folder` names it, with forward slashes.
+
+    It is relative to the folder, with ".." if needed. It is absolute if the file is on another drive, or if ".." would
+    lead elsewhere because of linked folders.
+    """
     with suppress(ValueError):  # on another drive
         way = os.path.relpath(path, folder)
         # With linked folders, ".." can lead elsewhere.

@@ -103,7 +103,12 @@ class _Edge:
         return _speeds(x)[1:-1], lean[1:-1]
 
     def at(self, x: float, lean: float) -> np.ndarray:
-        """Return the edge's x in each of its rows (n,), from x in the middle row and the lean in pixels per row."""
+        """Return the edge's x in each of its rows, (n,), as a straight line.
+
+        Args:
+            x: x in the middle of the edge's rows, in pixels.
+            lean: Pixels to the right per row down.
+        """
         return x + lean * (self.rows - self.rows.mean())
 
 

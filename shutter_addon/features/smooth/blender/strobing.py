@@ -46,10 +46,11 @@ class _Measuring:
     """What is measured, and what is known.
 
     Attributes:
-        moved: How the picture moves between neighboring frames. Keys are the source's key and the first of the two
-            frames. The value None means that motion cannot be found or is being measured.
-        looks: What the last call of `look` found, by session_uid of the effect scene: the timeline frame, the step in
-            pixels (None: none to report), and whether the source repeats frames.
+        moved: How the picture moves between two neighboring frames, by (SourceSpec.key, first of the two frames). None:
+            the motion cannot be found, or it is being measured. Pairs that are not in it have yet to be measured.
+        looks: What the last call of `look` found, by session_uid of the effect scene: the timeline frame, how many
+            pixels the picture moves from one exposed frame to the next (None: nothing to report), and whether the
+            source repeats frames.
         wanted: What to measure next: the source, and the first of two neighboring frames; None: nothing.
         job: The measurement that is running on a thread; None: none is.
     """
@@ -130,7 +131,10 @@ def _exposed_pairs(renderer: Renderer, request: Request) -> dict[int, set[int]]:
 
 
 def _visible(state: FrameState) -> set[int]:
-    """Return the indices of the shutters that expose any pixel."""
+    """Return the indices of the shutters that have strokes, mattes or layers; no pixels are examined.
+
+    The default shutter, 0, counts too if there are no strokes or if the picture's border gets it.
+    """
     drawn = {shape.shutter for shape in state.shapes if len(shape.strokes)}
     if state.options.border or not drawn:
         drawn.add(0)
