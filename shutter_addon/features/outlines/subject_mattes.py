@@ -449,7 +449,7 @@ class SubjectMattes(CarriedMattes):
             around = [self._keys[end] for end in nearest(frame, self._showing) if end is not None]
             self._keys[frame] = derived.key({"strokes": self._keys[frame], "around": around})
         self._before: tuple[int, np.ndarray, np.ndarray] | None = None
-        self._written: tuple[Path, np.ndarray, float] | None = None
+        self._written: tuple[Path, np.ndarray | None, float | None] | None = None
 
     def read(self, index: int) -> np.ndarray:
         """Return a frame's matte, (height, width) float32, 0 to 1. Without any keyframes, it is empty.
@@ -576,10 +576,10 @@ class SubjectMattes(CarriedMattes):
             the file is damaged, the matte is empty, nothing is excluded, and the confidence is GONE.
         """
         path = self._path(before, end, None)
-        if (written := self._written) is not None and written[0] == path:
-            matte, sure = written[1:]
-        else:
-            matte, sure = self._kept(path), self._described(path)
+        written = self._written
+        if written is None or written[0] != path:
+            written = path, self._kept(path), self._described(path)
+        _, matte, sure = written
         low, high = sorted((before, frame))
         if matte is None or sure is None or sure == GONE or before not in self._shots.around(frame, low, high):
             return self._nothing(), self._nothing(), GONE
