@@ -165,7 +165,6 @@ def _uncaught(before: Callable, kind: type, error: BaseException, trace: Traceba
     Args:
         before: The hook that was installed before.
         kind: The error's type.
-        error: The error.
         trace: The error's traceback.
     """
     recent_errors.exception(error)

@@ -330,7 +330,6 @@ class Diffusion:
         neighbors, else in four colors, for eight neighbors.
 
         Args:
-            grid: The grid.
             sweeps: The number of sweeps.
             back: Whether the colors come in reverse order.
         """
@@ -346,7 +345,6 @@ class Diffusion:
         """Return a pass from `operators` in the variant for a grid: `finest` for pixels, "STENCIL" for coarser grids.
 
         Args:
-            grid: The grid.
             name: A key of what `operators` returns, such as "smooth".
         """
         return self.finest[name] if grid.finest else _COARSER[name]
@@ -370,7 +368,6 @@ class Diffusion:
 
         Args:
             program: The pass. It gets the grid's textures and sizes by name, as far as it has them.
-            grid: The grid.
             tiles: The name of the list, a key of _Grid.ranges.
             cells: Invocations for each tile; for the pass "weights", for two tiles.
             layers: The number of layers (of four shutters) to run it on.

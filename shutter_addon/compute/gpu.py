@@ -291,7 +291,6 @@ class GPUCompositor:
         """Send to the device what the shader needs to convert pictures of one size to a display's levels.
 
         Args:
-            display: The display.
             noise: The display's noise for the picture's pixels, (H, W).
 
         Returns:

@@ -166,7 +166,6 @@ class LayerMattes:
         ramps and of drawn layers are not in the picture itself, so these layers get a matte of zeros.
 
         Args:
-            layers: The layers.
             frame: The source frame.
         """
         shown = layers.mattes[self._place(layers, frame)]
@@ -294,7 +293,6 @@ class LayerColors:
         """Set the layers, options and shot that all other methods use from now on, and drop cached frames.
 
         Args:
-            layers: The layers.
             options: FrameState.options of the picture.
             shot: The source frames of the picture's shot. Only these are searched for the background.
         """

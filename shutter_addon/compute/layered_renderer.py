@@ -137,7 +137,6 @@ class LayeredRenderer:
         Args:
             request: The picture.
             behind: The request for the background, as for `draw`.
-            layers: The layers.
         """
         states = [behind.state, *(request.state.of([shutter]) for shutter in layers.shutters)]
         parts = {(i, False): replace(behind, state=state) for i, state in enumerate(states, -1)}

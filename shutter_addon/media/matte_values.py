@@ -47,7 +47,6 @@ class MatteValues:
         """Return the values of mattes at a frame, each with a key.
 
         Args:
-            mattes: The mattes.
             index: The source frame that is shown. Moments between filmed frames count as source frames.
             block: The side in pixels of the square blocks that share one value, which is their mean. 1: a value for
                 each pixel.

@@ -110,7 +110,6 @@ def movie_channel(movie: FrameSource, channel: str) -> FrameSource:
     that may have colors, and 0 for the alpha of an opaque movie.
 
     Args:
-        movie: The movie.
         channel: "luminance", "red", "green", "blue" or "alpha" (sequence.CHANNELS).
     """
     grey_of = getattr(movie, "grey", lambda _index: None)  # BlenderMovie has no `grey`

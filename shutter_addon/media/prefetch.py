@@ -24,7 +24,6 @@ class PrefetchSource(SourceWrapper):
         """Prepare to decode a source's frames ahead of time.
 
         Args:
-            source: The source.
             planes: Whether the thread calls the source's `decoded` in place of `read`. Frames may then be Planes or
                 Moments (frame_source), which `decoded` returns and `read` converts to RGBA.
         """

@@ -41,7 +41,6 @@ def aim_pen(effect: PropertyGroup, name: str = "layer") -> None:
     Do nothing if there is no active region, or it does not have that layer.
 
     Args:
-        effect: The effect.
         name: The region's property that names the layer: one of annotations.LAYERS.
     """
     region = active_region(effect)
@@ -156,7 +155,6 @@ def preset_of(effect: PropertyGroup, index: int) -> str:
     It has none if its bars were changed since the preset was chosen, or have F-curves.
 
     Args:
-        effect: The effect.
         index: The shutter's index.
     """
     shutter, weights = effect.shutters[index], bars(effect.shutters[index])
@@ -172,7 +170,6 @@ def _change_bars(effect: PropertyGroup, index: int, change: Callable[..., np.nda
     """Replace a shutter's bars by the results of a function, also at each key if the bars have keys.
 
     Args:
-        effect: The effect.
         index: The shutter's index.
         change: Takes the bars (L,): how much each frame counts. It returns the new bars, which may have another length,
             the same one in all calls.

@@ -33,7 +33,6 @@ def new_effect(scene, number: int):
     autosave.
 
     Args:
-        scene: The scene.
         number: The format of the data that the caller will fill the effect with.
     """
     group = scene.virtual_shutter

@@ -49,7 +49,6 @@ def key(scene: Scene, effect: PropertyGroup, strip: Strip, frames: range) -> str
 
     Args:
         scene: The scene that has the effect.
-        effect: The effect.
         strip: The effect strip.
         frames: The frames that are or will be baked, numbered as in frames_of.
 
@@ -105,7 +104,6 @@ def parts(effect: PropertyGroup, strip: Strip, files: Files, start: int | None =
     that plays.
 
     Args:
-        effect: The effect.
         strip: The effect strip.
         files: Returns a value that identifies the files of a strip or an image matte: `_stamps` or `_contents`.
         start: The timeline frame from which frames are counted, so that the result does not change if all strips move
@@ -132,7 +130,6 @@ def _source(effect: PropertyGroup, source: Strip, files: Files, start: int) -> H
     """Return what identifies the source's footage, and which of its frames is shown at which time.
 
     Args:
-        effect: The effect.
         source: The source strip.
         files: As in `parts`.
         start: The timeline frame from which frames are counted.
@@ -247,7 +244,6 @@ def timing(strip: Strip, start: int = 0) -> StripTiming:
     The result does not depend on the strip's name, or on where it was cut.
 
     Args:
-        strip: The strip.
         start: The timeline frame from which the start and end of its content are counted.
     """
     lies = source_media.timing_of(strip)

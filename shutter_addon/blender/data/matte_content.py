@@ -184,7 +184,6 @@ def _of_strip(strip: Strip, word: str) -> MatteFile:
     """Return a MatteFile that reads the footage of a movie, image or clip strip.
 
     Args:
-        strip: The strip.
         word: The channel that is the matte, as in `channel`.
 
     Raises:
@@ -206,7 +205,6 @@ def choose_strip(region: PropertyGroup, name: str) -> None:
     such strip, the region has no matte strip any more.
 
     Args:
-        region: The region.
         name: The strip's name.
     """
     editor = region.id_data.sequence_editor

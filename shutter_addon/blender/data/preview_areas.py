@@ -24,7 +24,6 @@ class Shown(NamedTuple):
 
     Attributes:
         scene: The scene that has the strip and its effect.
-        effect: The effect.
         strip: The effect strip.
         strips_above: Whether visible strips lie in higher channels; they may cover it.
         hides_strokes: For each region with strokes (all but mattes and ramps) whose shutter exists, in order, whether
@@ -116,7 +115,6 @@ def look(context: Context, scene: Scene, effect: PropertyGroup, strip: Strip) ->
     Args:
         context: The context, whose windows are searched for previews.
         scene: The scene of the edit, which has the effect strip.
-        effect: The effect.
         strip: The effect strip.
 
     Returns:

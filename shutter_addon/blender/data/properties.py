@@ -88,7 +88,6 @@ def _region_renamed(region: PropertyGroup, new: str, old: str, is_set: bool) -> 
     `name`. Blender's own `maxlen` would count bytes, not characters.
 
     Args:
-        region: The region.
         new: The new name.
         old: The name until now.
         is_set: Whether the region had a name until now; if not, no shutter follows it.

@@ -226,7 +226,6 @@ class Sampling:
         """Return how the region was moved when each of its drawings was made, to lay drawings where they were drawn.
 
         Args:
-            region: The region.
             path: Data path of the region from the scene.
             numbers: Timeline frames of the drawings.
 

@@ -139,7 +139,6 @@ def _around(effect: PropertyGroup, frames: Frames, has_layers: bool) -> Frames:
     other frames.
 
     Args:
-        effect: The effect.
         frames: Timeline frames for which pictures will be made.
         has_layers: Whether a region of the effect is a layer.
     """
@@ -183,7 +182,6 @@ def bars_at(scene: Scene, effect: PropertyGroup, index: int, frame: float) -> np
 
     Args:
         scene: The scene that has the effect.
-        effect: The effect.
         index: Index of the shutter in the effect.
         frame: The timeline frame.
 
@@ -327,7 +325,6 @@ def _bars(sampling: Sampling, path: str, shutter: PropertyGroup, options: keyfra
     Args:
         sampling: Reads the effect.
         path: Data path of the shutter from the scene.
-        shutter: The shutter.
         options: Channel of the effect's options, which give the window's length.
 
     Raises:

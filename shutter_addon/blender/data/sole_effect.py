@@ -57,7 +57,6 @@ def strip_at(scene: Scene, frame: int, but: str | None = None) -> tuple[Strip, b
     """Return the effect strip that alone makes a scene's image at a timeline frame: on top, unchanged and filling it.
 
     Args:
-        scene: The scene.
         frame: The timeline frame.
         but: Name of a strip that is ignored, as if it were not there; None: no strip is ignored.
 

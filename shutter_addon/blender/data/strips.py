@@ -73,7 +73,6 @@ def find_effect(effect_scene: Scene, scene_frame: float = 0) -> tuple[Scene, Pro
     """Return the scene that has an effect, the effect, and a strip that shows it, given the effect scene.
 
     Args:
-        effect_scene: The effect scene.
         scene_frame: Frame of the effect scene. If an effect strip was cut into parts, the part that shows this frame is
             returned; if none does, the first part.
 

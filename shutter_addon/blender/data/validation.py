@@ -63,7 +63,6 @@ def check(items: Sequence[PropertyGroup], name: str, numbers: np.ndarray) -> Non
     """Check that numbers for one property of the items of a collection lie in the property's range.
 
     Args:
-        items: The items.
         name: The property's name.
         numbers: (n,): a number for each item.
 

@@ -229,7 +229,6 @@ def _read_layer(texture: GPUTexture, layer: int, box: tuple, components: int, ki
     """Read a rectangle of one layer of a texture into an array. GPUTexture.read() could read only the first layer.
 
     Args:
-        texture: The texture.
         layer: Index of the layer.
         box: Left, bottom, width and height of the rectangle, in texels.
         components: Numbers that each texel has: 1 or 4.

@@ -71,7 +71,6 @@ def choose_source(effect: PropertyGroup, strip: Strip, source: Strip) -> None:
     """Make an effect use another movie, image or clip strip as its source.
 
     Args:
-        effect: The effect.
         strip: The effect strip that shows it, which is then connected to the source.
         source: The new source.
 
@@ -154,7 +153,6 @@ def settings(strip: Strip, name: str) -> list[tuple[bpy_struct, str]]:
     """Return one strip property or, if the property is a group, all writable properties in the group.
 
     Args:
-        strip: The strip.
         name: Name of the property or group, one of those in LOOK.
 
     Returns:

@@ -67,7 +67,6 @@ def set_bars(shutter: PropertyGroup, weights: Sequence[float] | np.ndarray) -> N
     """Set the weights of a shutter's bars. Bars that have the wanted weight already are not touched.
 
     Args:
-        shutter: The shutter.
         weights: (L,): how much each frame of the window counts, one for each bar.
     """
     for bar, weight in zip(shutter.bars, weights, strict=True):
@@ -84,7 +83,6 @@ def paint(effect: PropertyGroup, index: int, weights: Sequence[float] | np.ndarr
     """Give a shutter as many bars as there are weights, and set their stored weights.
 
     Args:
-        effect: The effect.
         index: Index of the shutter in the effect.
         weights: (L,): how much each frame of the window counts.
         key: Also insert keyframes at the current frame. Without them, animated bars change back with the next frame.
@@ -103,7 +101,6 @@ def key_bars(effect: PropertyGroup, index: int) -> None:
     """Insert keyframes at the current frame for all bars of a shutter, with the weights of the picture there.
 
     Args:
-        effect: The effect.
         index: Index of the shutter in the effect.
 
     Raises:
@@ -137,7 +134,6 @@ def shown(effect: PropertyGroup, index: int) -> tuple[np.ndarray, list[str]]:
     """Return what the bar editor draws of a shutter at the current frame. It is cached until something changes.
 
     Args:
-        effect: The effect.
         index: Index of the shutter in the effect.
 
     Returns:

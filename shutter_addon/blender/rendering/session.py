@@ -201,7 +201,6 @@ class RenderSession:
         Cancelling the caller's work (stopping.once) neither ends the call nor the waiting.
 
         Args:
-            function: The function.
             arguments: Its positional arguments.
         """
         with stopping.once(stopping.never):

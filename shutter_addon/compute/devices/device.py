@@ -190,7 +190,6 @@ class Device:
         """Copy an array into the first rows of one layer of a texture. Other rows stay as they are.
 
         Args:
-            texture: The texture.
             array: (rows, width[, components]), C-contiguous, in the NumPy type of the texture's format. It may have
                 fewer rows than the texture.
             layer: The index of the layer.

@@ -65,7 +65,6 @@ def position(strip: StripTiming, rate: float, length: int, frame: float) -> np.f
     """Return which position in a strip's content a timeline frame shows, computed in float32 like Blender.
 
     Args:
-        strip: The strip.
         rate: Frames of the content per timeline frame before retiming, from `playback_rate`.
         length: The number of frames of the content.
         frame: The timeline frame.
@@ -92,7 +91,6 @@ def playback_rate(strip: StripTiming, length: int, fps: float) -> float:
     1. Blender's API does not tell which, so the one is chosen that agrees better with the strip's length.
 
     Args:
-        strip: The strip.
         length: The number of frames of the content.
         fps: The movie's frames per second. 0, for images: the result is 1.
     """

@@ -37,7 +37,6 @@ def span(frames: Sequence[float], frame: float) -> tuple[int, int, float]:
 
     Args:
         frames: The keys' frames, ascending.
-        frame: The frame.
     """
     after = bisect_right(frames, frame)
     if after == 0:
@@ -193,7 +192,6 @@ class Bars:
         """Return the bars at a frame.
 
         Args:
-            frame: The frame.
             interpolation: Options.interpolation, for frames between two keys. "displacement" moves the open bars in
                 time (paper §3.4.1); if all bars of one of the two keys are 0, it does as "value" does. "value" uses
                 `channel`, in which each bar fades by itself.
@@ -225,7 +223,6 @@ def eased_span(frames: Sequence[float], eases: Sequence[Ease], frame: float) -> 
     Args:
         frames: The keys' frames, ascending.
         eases: For each key the ease from it to the next; that of the last key does not matter.
-        frame: The frame.
     """
     before, after, share = span(frames, frame)
     return before, after, eased(share, eases[before])

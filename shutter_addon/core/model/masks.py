@@ -147,7 +147,6 @@ def _steps(spline: MaskSpline, points: np.ndarray, weights: np.ndarray, larger: 
     It is one for every 4 pixels of the longest segment, and more if feather points change the feather's width quickly.
 
     Args:
-        spline: The spline.
         points: MaskSpline.points as an array (n, 3, 2).
         weights: MaskSpline.weights as an array (n,).
         larger: The picture's larger side in pixels.
@@ -168,7 +167,6 @@ def _positions(spline: MaskSpline, count: int, steps: int) -> tuple[np.ndarray, 
     """Return at which places of a spline the n points of its polygon lie.
 
     Args:
-        spline: The spline.
         count: The number of the spline's own points. Segment i goes from point i to the next one.
         steps: Into how many pieces each segment is divided.
 
@@ -185,7 +183,6 @@ def _at(spline: MaskSpline, points: np.ndarray, segment: np.ndarray, u: np.ndarr
     """Return the points of a spline at n places.
 
     Args:
-        spline: The spline.
         points: MaskSpline.points as an array (count, 3, 2).
         segment: For each place the index of its segment (n,). Segment i goes from point i to the next one. For a closed
             spline, indices wrap around; for an open one, segment count − 1 gives the last point.
@@ -222,7 +219,6 @@ def _widths(spline: MaskSpline, weights: np.ndarray, segment: np.ndarray, u: np.
     Between the spline's points and feather points the width is interpolated, by MaskSpline.weight_interpolation.
 
     Args:
-        spline: The spline.
         weights: MaskSpline.weights as an array.
         segment: For each place the index of its segment (n,). Segment i goes from point i to the next one.
         u: The place on the segment (n,), 0 to 1.

@@ -171,7 +171,6 @@ class MatteReader(Protocol):
         """Return the values of mattes at a shown frame, each with a key for caching: equal keys mean equal values.
 
         Args:
-            mattes: The mattes.
             index: The footage's frame that is shown, from 0, counting moments (frames made between two filmed ones).
                 Matte files have filmed frames only; the file's nearest frame is used beyond its ends.
             block: The values are means over blocks of `block` × `block` pixels; 1: one value per pixel.

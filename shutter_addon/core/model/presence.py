@@ -36,7 +36,6 @@ class Key(NamedTuple):
     """A key of the factor that fades a region's opacity, or the camera's influence, out and in.
 
     Attributes:
-        frame: The frame.
         value: 0 (faded out) or 1 (in full).
         ease: How the value changes from this key to the next one: "linear" or "constant" (it jumps at the next key).
     """

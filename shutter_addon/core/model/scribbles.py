@@ -62,7 +62,6 @@ def resample(stroke: ArrayLike, count: int, aspect: float = 1.0) -> np.ndarray:
     """Return `count` points (count, 2) at equal distances along a stroke (n, 2), with the same ends.
 
     Args:
-        stroke: The stroke.
         count: The number of points.
         aspect: The picture's width / height, for measuring distances.
     """
@@ -181,7 +180,6 @@ class Drawings:
         """Return the strokes at a frame, moved, turned and scaled about their center by the region's keys.
 
         Args:
-            frame: The frame.
             placed: The placement that the region's keys give it.
 
         Raises:

@@ -56,7 +56,6 @@ def state_at(effect: Effect, clip: Clip, frame: float) -> Moment:
     here: they are only found by reading pictures.
 
     Args:
-        effect: The effect.
         clip: The footage. If the effect has a `time` of its own, that replaces the clip's timing.
         frame: The timeline frame, possibly between two whole ones.
 
@@ -81,7 +80,6 @@ def _in_moments(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> Fra
     spread evenly over their moments, so that the shape stays.
 
     Args:
-        effect: The effect.
         state: Its state at the shown frame, with bars of filmed frames.
         clip: The footage; its `step` is the number of moments per filmed frame.
         at: The shown frame.
@@ -103,7 +101,6 @@ def _layered(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameS
     The state is unchanged if no layer is visible.
 
     Args:
-        effect: The effect.
         state: Its state at the shown frame, in moments.
         clip: The footage.
         at: The shown frame.
@@ -161,7 +158,6 @@ def _scribbles(
     regions whose opacity is 0 have none.
 
     Args:
-        effect: The effect.
         state: The effect's state at the shown frame, whose options are used, except `edge_aware`.
         drawn: (1 + the layer's index, region) for each region of strokes, later ones on top; 0 instead for a region
             that is no layer.
@@ -198,7 +194,6 @@ def followed(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameS
     The state is unchanged if no shutter follows anything.
 
     Args:
-        effect: The effect.
         state: Its state at the shown frame, in moments.
         clip: The footage.
         at: The shown frame.
@@ -234,7 +229,6 @@ def _with_trails(effect: Effect, state: FrameState, following: Following, clip: 
     (Shutter.trail). Exposures that follow the camera are then shortened by Camera.influence.
 
     Args:
-        effect: The effect.
         state: Its state at the shown frame, in moments.
         following: The motion of each shutter's subject in each source frame.
         clip: The footage.

@@ -61,7 +61,6 @@ def slid(state: FrameState, index: int, direction: int, shot: range, *, whole: b
     shot. An exposure longer than the shot covers all of it and reaches beyond.
 
     Args:
-        state: The state.
         index: The shown source frame.
         direction: As for `positions`.
         shot: The source frames of the shot.

@@ -124,7 +124,6 @@ def _shutter(
     """Convert one shutter of an effect to the form that recipes have, with keys.
 
     Args:
-        effect: The effect.
         index: The shutter's index in the effect.
         name: Its name in the recipe.
         follow: The converted region or camera that it follows; None: it follows nothing.
@@ -252,7 +251,6 @@ def _region(
     """Convert a region to the form that recipes have, with keys.
 
     Args:
-        region: The region.
         name: Its name in the recipe.
         contents: Yields the contents that are left of `with_keys`. A region with a matte file or ramp takes the next
             one; others take none.
@@ -327,7 +325,6 @@ def _drawings(drawings: Drawings, frame: float) -> dict[float, list[np.ndarray]]
     """Return a region's drawings in fractions of the picture, without those before the first one that has strokes.
 
     Args:
-        drawings: The drawings.
         frame: The timeline frame whose picture the fractions refer to: a strip's transform can move strokes over time.
 
     Returns:

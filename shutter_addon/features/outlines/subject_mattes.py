@@ -167,7 +167,6 @@ def found(network: Network, picture: np.ndarray, on: np.ndarray, off: np.ndarray
     picture.
 
     Args:
-        network: The network.
         picture: The working picture, (h, w, 3) uint8.
         on: The pixels that strokes on the subject cover, (h, w) bool.
         off: The pixels that strokes on what does not belong to it cover, (h, w) bool. They are removed from the
@@ -242,7 +241,6 @@ def without(subject: Found, picture: np.ndarray, on: np.ndarray, off: np.ndarray
     edges, and the side of `off` is removed. If no part is touched, the subject is returned as it is.
 
     Args:
-        subject: The subject.
         picture: The working picture, (h, w, 3) uint8.
         on: The pixels that strokes on the subject cover, (h, w) bool. If none lies in the touched parts, pixels there
             that are far from `off` stand for it when the parts are divided.
@@ -294,7 +292,6 @@ def followed(network: Network, before: np.ndarray, picture: np.ndarray, subject:
     """Follow a subject to the next frame: carry it there by optical flow, and correct it by the network.
 
     Args:
-        network: The network.
         before: Working picture of the frame where the subject is known, (h, w, 3) uint8.
         picture: Working picture of the next frame (earlier in time if a chain goes backward), (h, w, 3) uint8.
         subject: The subject in the frame `before`.

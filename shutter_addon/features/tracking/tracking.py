@@ -84,7 +84,6 @@ class FoundMotion(NamedTuple):
     """A motion that was found, from one picture, mostly that where tracking began, to another one.
 
     Attributes:
-        motion: The motion.
         confidence: How sure it is, 0 to 1.
         held: Positions in the other picture of the corners that agree with it, (n,) complex; empty if not needed.
     """

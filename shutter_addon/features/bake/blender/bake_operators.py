@@ -210,7 +210,6 @@ def add_strip(scene: Scene, strip: Strip, film: baked_film.Film) -> Strip:
     Args:
         scene: The scene of the edit.
         strip: The effect strip.
-        film: The film.
 
     Returns:
         The baked strip.
@@ -298,7 +297,6 @@ def is_stale(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
 
     Args:
         scene: The scene of the edit.
-        effect: The effect.
         strip: The effect strip.
     """
     place = _place(scene, effect, strip)

@@ -47,7 +47,6 @@ def at_frames(mask: Mask, frames: Iterable[int]) -> Iterator[masks.MaskShape]:
     """Yield the shape of a mask at each of these frames, as Blender evaluates it there: with all motion applied.
 
     Args:
-        mask: The mask.
         frames: Frames at which to evaluate the mask, counted as in the mask's own F-curves.
 
     Raises:

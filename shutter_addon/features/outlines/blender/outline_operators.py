@@ -47,7 +47,6 @@ def curves_now(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) ->
 
     Args:
         scene: The scene of the edit, which has the current frame.
-        effect: The effect.
         strip: The effect strip.
         index: The index of the region in the effect.
 
@@ -78,7 +77,6 @@ def carried_frames(scene: Scene, effect: PropertyGroup, strip: Strip, index: int
 
     Args:
         scene: The scene of the edit.
-        effect: The effect.
         strip: The effect strip.
         index: The index of the region in the effect.
 
