@@ -28,11 +28,11 @@ HALF_MAX = 65504  # the largest value of a half float, which infinite samples co
 # pictures it is less in proportion, but at least NOISE.
 UNLIKE, GREY, NOISE = 24.0, 90.0, 4.0
 SHARED = 0.5  # the share of vectors, in each direction, that have to be good
-# Where nothing moves farther than STILL between two frames, in 1 / UNIT of a pixel, moments are mixes of both frames.
-# Up to MOVES, one key moment lies between them; each doubling of the distance doubles the key moments.
-STILL, MOVES = UNIT // 4, 2 * UNIT
+# The farthest that a tile may move between two key moments, in 1 / UNIT of a pixel: mixes of pictures that are no farther
+# apart look as good as pictures made by flow.
+APART = UNIT
 _KEPT = 4  # cached key moments, and cached sets of vectors
-VERSION = 2  # raise it when `found` gives something else of the same pictures
+VERSION = 3  # raise it when `found` gives something else of the same pictures
 
 
 class Between:
@@ -216,11 +216,10 @@ def found(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     for a, b in (halves, halves[::-1]):
         stopping.check()
         if min(height, width) >= SMALLEST:
-            way = _dis(a, b, stride=5, quick=True)
+            way = cv2.medianBlur(_dis(a, b, stride=4, smoothness=None), 5)  # which removes outliers
         cost = cv2.blur(cv2.absdiff(a, look(b, grid(*a.shape) + way)).astype(np.float32), (3, 3))
-        sides += [2 * way, cost]
-    apart = STEP // 2
-    values = np.dstack(sides)[::apart, ::apart][: shape[0], : shape[1]]
+        sides += [each[:: STEP // 2, :: STEP // 2] for each in (2 * way, cost)]
+    values = np.dstack(sides)[: shape[0], : shape[1]]
     return values.clip(-HALF_MAX, HALF_MAX).astype(np.float16)
 
 
@@ -231,16 +230,15 @@ def _half(picture: np.ndarray) -> np.ndarray:
     return resized(even, (even.shape[1] // 2, even.shape[0] // 2))
 
 
-def _dis(first: np.ndarray, second: np.ndarray, stride: int, smoothness: float = 20, quick: bool = False) -> np.ndarray:
+def _dis(first: np.ndarray, second: np.ndarray, stride: int, smoothness: float | None = 20) -> np.ndarray:
     """Find optical flow with OpenCV's DIS method.
 
     Args:
         first: The picture where the vectors start, (H, W) uint8.
         second: The picture where they end, of the same shape.
         stride: The distance between the patches that are compared, in pixels. A smaller one is slower and more exact.
-        smoothness: The weight of smooth vectors (OpenCV's alpha).
-        quick: Whether to refine the vectors less. With a stride of 5, that takes a third of the time, and moments look
-            as good.
+        smoothness: The weight of smooth vectors when they are refined (OpenCV's alpha). None: they are not refined,
+            which takes two thirds of the time.
 
     Returns:
         (H, W, 2): for each pixel of the first picture, the vector to its place in the second, x and y in pixels.
@@ -249,10 +247,11 @@ def _dis(first: np.ndarray, second: np.ndarray, stride: int, smoothness: float =
     dis = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
     dis.setFinestScale(0)
     dis.setPatchStride(stride)
-    dis.setVariationalRefinementAlpha(smoothness)
-    if quick:
-        dis.setGradientDescentIterations(12)
-        dis.setVariationalRefinementIterations(2)
+    if smoothness is None:
+        dis.setGradientDescentIterations(16)
+        dis.setVariationalRefinementIterations(0)
+    else:
+        dis.setVariationalRefinementAlpha(smoothness)
     height, width = first.shape
     beyond = max(SMALLEST - height, 0), max(SMALLEST - width, 0)
     wide = (cv2.copyMakeBorder(each, 0, beyond[0], 0, beyond[1], cv2.BORDER_REPLICATE) for each in (first, second))
@@ -260,7 +259,7 @@ def _dis(first: np.ndarray, second: np.ndarray, stride: int, smoothness: float =
     return np.nan_to_num(dis.calc(*wide, None)[:height, :width], posinf=0, neginf=0)
 
 
-# Vectors by cost, the highest first: places and vectors (2, n), x and y in cells of STEP pixels, and costs (n,).
+# Vectors by cost, the highest first, in cells of STEP pixels: places (2, n), vectors x + iy (n,), and costs (n,).
 _Carriers = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
@@ -289,8 +288,7 @@ def _of_keys(sides: list[_Carriers], shape: tuple[int, ...], keys: int) -> tuple
         keys: Into how many equal parts the key moments divide the time between the frames, a power of two.
     """
     paths = np.stack([_paths(sides, shape, key / keys) for key in range(1, keys)])
-    way = paths[..., :2]
-    most, least = (each.astype(np.float32) - ZERO for each in (way.max(axis=0), way.min(axis=0)))
+    most, least = (each[..., :2].astype(np.float32) - ZERO for each in (paths.max(axis=0), paths.min(axis=0)))
     farthest = np.maximum(most, -least).max(axis=2)
     # A pixel's path is interpolated between its cell and the next ones to the right and below.
     farthest = cv2.dilate(farthest, np.ones((2, 2), np.uint8), anchor=(0, 0))
@@ -298,14 +296,14 @@ def _of_keys(sides: list[_Carriers], shape: tuple[int, ...], keys: int) -> tuple
     height, width = farthest.shape
     cells = np.pad(farthest, ((0, -height % down), (0, -width % across)))
     tiles = cells.reshape(-(-height // down), down, -1, across).max(axis=(1, 3))
-    steps = [STILL, *(MOVES << level for level in range(keys.bit_length() - 2))]
+    steps = [APART << level for level in range(keys.bit_length() - 1)]
     return paths, np.searchsorted(steps, tiles).astype(np.uint8)
 
 
 def _paths(sides: list[_Carriers], shape: tuple[int, ...], t: float) -> np.ndarray:
     """Return the vectors (h, w, 4) of Moment.vectors at a time from 0 (the first frame) to 1 (the second)."""
     (forth, cost), (back, other) = (_carry(*side, shape, s) for side, s in zip(sides, (t, 1 - t), strict=True))
-    vectors = np.where(cost <= other, forth, -back).transpose(1, 2, 0)
+    vectors = np.where(cost <= other, forth, -back).view(np.float32).reshape(*cost.shape, 2)
     arrived = [each < np.inf for each in (cost, other)]
     vectors = _filled(vectors, arrived[0] | arrived[1])
     stored = np.empty((*cost.shape, 4), np.uint16)
@@ -324,21 +322,21 @@ def _carry(
 
     Args:
         places: Where the vectors start, x and y (2, n), as in _Carriers.
-        vectors: The vectors to the other frame, x and y (2, n).
+        vectors: The vectors to the other frame (n,), x + iy.
         costs: The vectors' costs (n,), the highest first. The first is infinite, for "no vector" (`_carriers`).
         shape: The frames' (H, W) in pixels.
         t: The time, from 0 at the frame where the vectors start to 1 at the other.
 
     Returns:
-        For every STEPth pixel, the vector that passes there (2, h, w), and its cost (h, w). Where none passes, the cost
-        is infinite. h = ⌈H / STEP⌉, w = ⌈W / STEP⌉.
+        For every STEPth pixel, the vector that passes there, x + iy, and its cost, (h, w) each. Where none passes, the
+        cost is infinite. h = ⌈H / STEP⌉, w = ⌈W / STEP⌉.
     """
     h, w = (-(-n // STEP) for n in shape)
     stopping.check()
     # What leaves the picture goes into a margin of two cells. For numbers that are not negative, conversion is `floor`.
     x, y = (
         (place + np.float32(t) * vector).clip(0, end).astype(np.int32)
-        for place, vector, end in zip(places, vectors, (w + 2, h + 2), strict=True)
+        for place, vector, end in zip(places, (vectors.real, vectors.imag), (w + 2, h + 2), strict=True)
     )
     # Costs descend, so where several arrive, the last assignment is the cheapest. Where none arrives, the first vector
     # stays, whose cost is infinite.
@@ -348,7 +346,7 @@ def _carry(
     # Each arrives at the four corners of its cell.
     last = np.maximum(last[1:], last[:-1])
     chosen = np.maximum(last[:, 1:], last[:, :-1])
-    return vectors.take(chosen, 1), costs.take(chosen)
+    return vectors.take(chosen), costs.take(chosen)
 
 
 def _carriers(side: np.ndarray) -> _Carriers:
@@ -361,8 +359,8 @@ def _carriers(side: np.ndarray) -> _Carriers:
         side: x, y and cost of the vectors, (h, w, 3) float16.
 
     Returns:
-        The vectors' starting places and the vectors, (2, h · w + 1) each, in cells of STEP pixels, and their costs.
-        Places include the margin of two cells that `_carry` puts around the picture.
+        The vectors' starting places (2, n), the vectors (n,), x + iy, and their costs (n,), n = h · w + 1.
+        Lengths are in cells of STEP pixels. Places include the margin of two cells that `_carry` puts around the picture.
     """
     cost = np.ascontiguousarray(side[..., 2]).ravel()
     # As whole numbers, which NumPy sorts ten times as fast; costs are not negative.
@@ -371,8 +369,8 @@ def _carriers(side: np.ndarray) -> _Carriers:
     # The flow was found at half the size, where the middle of a pixel is half a pixel further.
     places = np.stack([column, row]).astype(np.float32) + np.float32(2 + 0.5 / STEP)
     x, y, cost = (each.ravel()[order].astype(np.float32) for each in np.moveaxis(side, 2, 0))
-    vectors = np.stack([x, y]) / np.float32(STEP)
-    return np.insert(places, 0, 0, axis=1), np.insert(vectors, 0, 0, axis=1), np.insert(cost, 0, np.inf)
+    vectors = (x + 1j * y) / np.float32(STEP)
+    return np.insert(places, 0, 0, axis=1), np.insert(vectors, 0, 0), np.insert(cost, 0, np.inf)
 
 
 def _filled(vectors: np.ndarray, known: np.ndarray) -> np.ndarray:
