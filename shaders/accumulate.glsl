@@ -28,10 +28,14 @@ uniform int first_key;
 // Of moments: the first one's number, of how many; key moments; the layer of the first frame. The tiles are those of a
 // level, listed from `listed.x` to `listed.y`, 256 to a row, each as x + 4096 y. MOMENT, which saves lookups: 1, they are
 // mixes of the two frames; 2, the first one lies behind the first frame, 3, behind key moment `first_key` of the level.
+// PER_KEY: all moments are added, so many from one key moment to the next, and compilers unroll the loop over these.
 uniform sampler2DArray tiles;
 uniform ivec4 moment;
 uniform ivec2 listed;
-uniform int count, layers, level;
+uniform int layers, level;
+#    if !PER_KEY
+uniform int count;
+#    endif
 #  else
 uniform sampler2DArray frame;
 #  endif
@@ -95,46 +99,50 @@ ivec2 pixel;
 ivec3 place;
 SUM sum;
 vec3 before;
-int made, position;  // how many were added; where the next one lies, in 1 / moment.y of two key moments
 
-// Adds the moments from the key moment before `key`, whose light is `before`, to this one.
-void add_until(int key, vec3 light) {
-  int steps = moment.y, start = (key - 1) * steps;
-  while (made < count && position <= key * steps) {
-    float late = float(position - start) / float(steps);
-    vec3 color = before * (1.0 - late) + light * late;  // exactly, of key moments
+// Adds moment `number`, which lies `late` between the key moment before it, whose light is `before`, and the next one.
+void add(int number, float late, vec3 light) {
+  vec3 color = before * (1.0 - late) + light * late;  // exactly, of key moments
 #  if DECODE == 0
-    color = to_level(color);
+  color = to_level(color);
 #  endif
-    sum = added(sum, light_of(color, pixel));
-    int layer = next + made;
-    store(place, layer < layers ? layer : layer - layers, sum);
-    made += 1;
-    position += 1 << level;
+  sum = added(sum, light_of(color, pixel));
+  int layer = next + number - moment.x;
+  store(place, layer < layers ? layer : layer - layers, sum);
+}
+
+// Adds the moments from the key moment before `key` to this one.
+void add_until(int key, vec3 light) {
+#  if PER_KEY
+  for (int i = 1; i <= PER_KEY; i++) {
+    add((key - 1) * PER_KEY + i, float(i) / float(PER_KEY), light);
   }
+#  else
+  int start = (key - 1) * moment.y, last = min(key * moment.y >> level, moment.x + count - 1);
+  for (int number = max((start >> level) + 1, moment.x); number <= last; number++) {
+    add(number, float((number << level) - start) / float(moment.y), light);
+  }
+#  endif
   before = light;
 }
 
 void main() {
-  ivec2 id = ivec2(gl_GlobalInvocationID.xy);
-  int number = listed.x + (id.y >> 4) * 256 + (id.x >> 3);
+  int number = listed.x + int(gl_WorkGroupID.y * 256u + gl_WorkGroupID.x);
   int tile = int(texelFetch(tiles, ivec3(number & 255, number >> 8, 0), 0).r);
-  ivec2 shown = ivec2(tile & 4095, tile >> 12) * ivec2(8, 16) + (id & ivec2(7, 15));
+  ivec2 shown = ivec2(tile & 4095, tile >> 12) * ivec2(8, 16) + ivec2(gl_LocalInvocationID.xy);
   pixel = shown - ivec2(0, top);
   if (number >= listed.y || any(greaterThanEqual(pixel, size))) {
     return;
   }
   place = place_of_sums(pixel);
   sum = sum_at(place, known);
-  made = 0;
-  position = moment.x << level;
 #  if MOMENT == 3
   before = key_light(shown, first_key * moment.z >> level);
 #  else
   before = frame_light(shown, moment.w);
 #  endif
 #  if MOMENT == 2 || MOMENT == 3
-  for (int key = first_key + 1; key < 1 << level && made < count; ++key) {
+  for (int key = first_key + 1; key < 1 << level; ++key) {
     add_until(key, key_light(shown, key * moment.z >> level));
   }
 #  endif

@@ -28,9 +28,9 @@ HALF_MAX = 65504  # the largest value of a half float, which infinite samples co
 # pictures it is less in proportion, but at least NOISE.
 UNLIKE, GREY, NOISE = 24.0, 90.0, 4.0
 SHARED = 0.5  # the share of vectors, in each direction, that have to be good
-# The farthest that a tile may move between two key moments, in 1 / UNIT of a pixel: mixes of pictures that are no farther
-# apart look as good as pictures made by flow.
-APART = UNIT
+# The farthest that a tile may move between two key moments, in 1 / UNIT of a pixel. Mixes of pictures no farther apart
+# look as good as pictures made by flow.
+FARTHEST = UNIT
 _KEPT = 4  # cached key moments, and cached sets of vectors
 VERSION = 3  # raise it when `found` gives something else of the same pictures
 
@@ -296,7 +296,7 @@ def _of_keys(sides: list[_Carriers], shape: tuple[int, ...], keys: int) -> tuple
     height, width = farthest.shape
     cells = np.pad(farthest, ((0, -height % down), (0, -width % across)))
     tiles = cells.reshape(-(-height // down), down, -1, across).max(axis=(1, 3))
-    steps = [APART << level for level in range(keys.bit_length() - 1)]
+    steps = [FARTHEST << level for level in range(keys.bit_length() - 1)]
     return paths, np.searchsorted(steps, tiles).astype(np.uint8)
 
 
@@ -359,8 +359,8 @@ def _carriers(side: np.ndarray) -> _Carriers:
         side: x, y and cost of the vectors, (h, w, 3) float16.
 
     Returns:
-        The vectors' starting places (2, n), the vectors (n,), x + iy, and their costs (n,), n = h · w + 1.
-        Lengths are in cells of STEP pixels. Places include the margin of two cells that `_carry` puts around the picture.
+        The vectors' starting places (2, n), the vectors (n,), x + iy, and their costs (n,), n = h · w + 1. Lengths are
+        in cells of STEP pixels. Places include the margin of two cells that `_carry` puts around the picture.
     """
     cost = np.ascontiguousarray(side[..., 2]).ravel()
     # As whole numbers, which NumPy sorts ten times as fast; costs are not negative.
