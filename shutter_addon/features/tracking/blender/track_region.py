@@ -47,7 +47,7 @@ def frames_to_track(scene: Scene, strip: Strip, direction: str, until: int = 0) 
     current, first, last = scene.frame_current, strip.left_handle, strip.right_handle - 1
     if not first <= current <= last:
         raise EffectError(rpt_("the current frame is outside the Shutter strip"))
-    if until > current:
+    if until > max(current, 0):
         last = min(last, until)
     elif 0 < until < current:
         first = max(first, until)
