@@ -23,19 +23,16 @@ uniform int red_of, blue_of;
 layout(r32ui) uniform readonly uimage2DArray filmed;  // images: see `luma`
 #    if MOMENT == 2 || MOMENT == 3
 layout(rgba16) uniform readonly image2DArray vectors;
-uniform int first_key;
+uniform ivec2 keys;
 #    endif
 // Of moments: the first one's number, of how many; key moments; the layer of the first frame. The tiles are those of a
 // level, listed from `listed.x` to `listed.y`, 256 to a row, each as x + 4096 y. MOMENT, which saves lookups: 1, they are
-// mixes of the two frames; 2, the first one lies behind the first frame, 3, behind key moment `first_key` of the level.
-// PER_KEY: all moments are added, so many from one key moment to the next, and compilers unroll the loop over these.
+// mixes of the two frames; 2, the first one lies behind the first frame, 3, behind key moment `keys.x` of the level.
+// The last one lies before key moment `keys.y`, or at it.
 uniform sampler2DArray tiles;
 uniform ivec4 moment;
 uniform ivec2 listed;
-uniform int layers, level;
-#    if !PER_KEY
-uniform int count;
-#    endif
+uniform int count, layers, level;
 #  else
 uniform sampler2DArray frame;
 #  endif
@@ -100,29 +97,19 @@ ivec3 place;
 SUM sum;
 vec3 before;
 
-// Adds moment `number`, which lies `late` between the key moment before it, whose light is `before`, and the next one.
-void add(int number, float late, vec3 light) {
-  vec3 color = before * (1.0 - late) + light * late;  // exactly, of key moments
-#  if DECODE == 0
-  color = to_level(color);
-#  endif
-  sum = added(sum, light_of(color, pixel));
-  int layer = next + number - moment.x;
-  store(place, layer < layers ? layer : layer - layers, sum);
-}
-
-// Adds the moments from the key moment before `key` to this one.
+// Adds the moments from the key moment before `key`, whose light is `before`, to this one.
 void add_until(int key, vec3 light) {
-#  if PER_KEY
-  for (int i = 1; i <= PER_KEY; i++) {
-    add((key - 1) * PER_KEY + i, float(i) / float(PER_KEY), light);
-  }
-#  else
-  int start = (key - 1) * moment.y, last = min(key * moment.y >> level, moment.x + count - 1);
-  for (int number = max((start >> level) + 1, moment.x); number <= last; number++) {
-    add(number, float((number << level) - start) / float(moment.y), light);
-  }
+  int start = (key - 1) * moment.y, end = min(key * moment.y >> level, moment.x + count - 1);
+  for (int number = max((start >> level) + 1, moment.x); number <= end; number++) {
+    float late = float((number << level) - start) / float(moment.y);
+    vec3 color = before * (1.0 - late) + light * late;  // exactly, of key moments
+#  if DECODE == 0
+    color = to_level(color);
 #  endif
+    sum = added(sum, light_of(color, pixel));
+    int layer = next + number - moment.x;
+    store(place, layer < layers ? layer : layer - layers, sum);
+  }
   before = light;
 }
 
@@ -137,12 +124,12 @@ void main() {
   place = place_of_sums(pixel);
   sum = sum_at(place, known);
 #  if MOMENT == 3
-  before = key_light(shown, first_key * moment.z >> level);
+  before = key_light(shown, keys.x * moment.z >> level);
 #  else
   before = frame_light(shown, moment.w);
 #  endif
 #  if MOMENT == 2 || MOMENT == 3
-  for (int key = first_key + 1; key < 1 << level; ++key) {
+  for (int key = keys.x + 1; key <= keys.y && key < 1 << level; ++key) {
     add_until(key, key_light(shown, key * moment.z >> level));
   }
 #  endif

@@ -26,9 +26,7 @@ _LISTED = 256  # tiles in a row of a list, as in shaders/accumulate.glsl
 STORED_SUMS = ("rgba16ui", "rgba32ui", "rgba32ui")
 
 
-def accumulation(
-    decode: int, sent: str, back: bool, tiled: int, cover: int = 0, kind: int = 1, per_key: int = 0
-) -> Pass:
+def accumulation(decode: int, sent: str, back: bool, tiled: int, cover: int = 0, kind: int = 1) -> Pass:
     """Return the shader pass that computes a running sum from the one beside it.
 
     The pass adds or subtracts the frame between the two.
@@ -45,9 +43,8 @@ def accumulation(
             layers.
         kind: For "MOMENT", which way of making it the shader uses: the value 1, 2 or 3 of its macro MOMENT, from
             `_by_level`.
-        per_key: For "MOMENT", the number of moments from one key moment to the next, from `_by_level`.
     """
-    macros = {"DECODE": decode, "BACK": int(back), "TILED": tiled, "COVER": cover, sent: kind, "PER_KEY": per_key}
+    macros = {"DECODE": decode, "BACK": int(back), "TILED": tiled, "COVER": cover, sent: kind}
     return read_pass("accumulate", STORED=STORED_SUMS[cover], **macros)
 
 
@@ -58,7 +55,7 @@ def _in_fours(plane: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(plane).view(np.dtype("<u4"))
 
 
-def _by_level(moment: Moment, part: Part, given: Given) -> Iterator[tuple[tuple[int, int], tuple[int, int], Given]]:
+def _by_level(moment: Moment, part: Part, given: Given) -> Iterator[tuple[int, tuple[int, int], Given]]:
     """Yield the shader passes that add a computed frame to a part of the window.
 
     In tiles with little motion, the frame needs fewer lookups along the motion (Moment.levels). Tiles of equal level
@@ -70,9 +67,8 @@ def _by_level(moment: Moment, part: Part, given: Given) -> Iterator[tuple[tuple[
         given: Arguments of the shader that all passes have.
 
     Yields:
-        The values of the shader's macros MOMENT (1, 2 or 3) and PER_KEY, the size (width, height) of the pass in
-        invocations, and all its arguments: `given` and those of the level. PER_KEY is the number of moments from one
-        key moment to the next, or 0 if that varies or if not all moments of the pair are added.
+        The value of the shader's macro MOMENT (1, 2 or 3), the size (width, height) of the pass in invocations, and all
+        its arguments: `given` and those of the level.
     """
     (across, down), listed = TILE, 0
     rows = part.top // down, -(-(part.top + part.height) // down)
@@ -81,12 +77,11 @@ def _by_level(moment: Moment, part: Part, given: Given) -> Iterator[tuple[tuple[
         first, last = (listed + np.searchsorted(down_to, rows)).tolist()
         listed += len(down_to)
         if first < last:
-            key = ((moment.number << level) - 1) // moment.steps
-            kind = 1 if level == 0 else 2 if key == 0 else 3
-            even = given["count"] == moment.steps and moment.steps % (1 << level) == 0
+            ends = moment.number, moment.number + given["count"] - 1
+            keys = ((ends[0] << level) - 1) // moment.steps, -(-(ends[1] << level) // moment.steps)
+            kind = 1 if level == 0 else 2 if keys[0] == 0 else 3
             extent = across * min(last - first, _LISTED), down * -(-(last - first) // _LISTED)
-            arguments = given | {"listed": (first, last), "level": level, "first_key": key}
-            yield (kind, even * moment.steps >> level), extent, arguments
+            yield kind, extent, given | {"listed": (first, last), "level": level, "keys": keys}
 
 
 class Sums(Window):
@@ -226,9 +221,9 @@ class Sums(Window):
         decode, images, moment = decoding(self.source.transfer, light), given.pop("images", {}), given.pop("of", None)
         for part, sums in self.stored():
             size = self.source.width, part.height
-            runs = [((), size, given)] if moment is None else _by_level(moment, part, given)
+            runs = [(1, size, given)] if moment is None else _by_level(moment, part, given)
             for kind, extent, arguments in runs:
-                program = accumulation(decode, sent, next_ < known, self.tiled, self.cover, *kind)
+                program = accumulation(decode, sent, next_ < known, self.tiled, self.cover, kind)
                 self.device.run(program, extent, images=images | {"sums": sums}, size=size, top=part.top, **arguments)
         frames = frames[: given.get("count", 1)]
         self._frames |= dict(enumerate(frames, min(known, next_)))

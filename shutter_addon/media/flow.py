@@ -237,8 +237,8 @@ def _dis(first: np.ndarray, second: np.ndarray, stride: int, smoothness: float |
         first: The picture where the vectors start, (H, W) uint8.
         second: The picture where they end, of the same shape.
         stride: The distance between the patches that are compared, in pixels. A smaller one is slower and more exact.
-        smoothness: The weight of smooth vectors when they are refined (OpenCV's alpha). None: they are not refined,
-            which takes two thirds of the time.
+        smoothness: The weight of smooth vectors when they are refined (OpenCV's alpha). None: patches are matched in
+            fewer steps and vectors are not refined, which takes two thirds of the time.
 
     Returns:
         (H, W, 2): for each pixel of the first picture, the vector to its place in the second, x and y in pixels.

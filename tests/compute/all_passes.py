@@ -82,8 +82,8 @@ def _layers():
         for way in _WAYS:
             yield composition(way, 3, **light, EDGES=2, SUMS=1, TILED=tiled)
         for sent in ("COLOURS", "PLANES", "MOMENT", "AGAIN"):
-            for kind, per_key in ((1, 8), (2, 4), (2, 0), (3, 0)) if sent == "MOMENT" else ((1, 0),):
-                yield running_sums.accumulation(1, sent, cover == 1, tiled, cover, kind, per_key)
+            for kind in (1, 2, 3) if sent == "MOMENT" else (1,):
+                yield running_sums.accumulation(1, sent, cover == 1, tiled, cover, kind)
     for ends, opaque in itertools.product((True, False), repeat=2):
         macros = {"ENDS": int(ends), "OPAQUE": int(opaque)}
         yield read_pass("layer", BEGINS=1, PLAIN=int(not opaque), PLATE=int(ends), LEVELS=int(ends), **macros)
