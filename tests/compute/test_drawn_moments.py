@@ -24,14 +24,14 @@ ROUNDED = 0.6  # levels: half of one, and what a GPU's pow adds to its argument 
 
 
 def film(rng, count=6, size=(53, 38), dtype=np.uint8):
-    """Soft blocks that move, each picture with some that stand still, and a cut before the last."""
+    """Soft blocks that move faster and faster, each picture with some that stand still, and a cut before the last."""
     blocks = rng.integers(0, 256, (2, size[1] // 6 + 4, size[0] // 6 + 8, 3)).repeat(6, 1).repeat(6, 2)
     for axis in (1, 2):
         blocks = sum(np.roll(blocks, k, axis) for k in range(-2, 3)) / 5
     frames = np.empty((count, size[1], size[0], 4))
     for k, frame in enumerate(frames):
         wide = blocks[int(k == count - 1)]
-        frame[..., :3] = wide[2 : 2 + size[1], 3 * k : 3 * k + size[0]]
+        frame[..., :3] = wide[2 : 2 + size[1], k * k : k * k + size[0]]
         frame[2:8, 4:14, :3] = wide[:6, :10]
     frames[..., 3] = 255
     most = np.iinfo(dtype).max if np.dtype(dtype).kind == "u" else 1
