@@ -57,7 +57,7 @@ def smooth(moment, steps=STEPS, direction=1):
 def test_a_moment_alone(device, size, steps):
     """Of each moment, the picture is what `read` gives."""
     source = SmoothSource(film(np.random.default_rng(1), size=size), steps)
-    for index in (1, steps // 2, steps + 1, 3 * steps - 1, 5 * steps - 1, source.count - 1):
+    for index in (1, steps // 2, steps + 1, 3 * steps - 1, 4 * steps - 1, 5 * steps - 1, source.count - 1):
         alone = FrameState(Options(1, step=steps), np.ones((1, 1)))
         picture = Renderer(device, source).picture(Request(index, alone))
         wanted = Footage(source.read(index)[None]).linear()[0]

@@ -47,9 +47,9 @@ def frames_to_track(scene: Scene, strip: Strip, direction: str, until: int = 0) 
     current, first, last = scene.frame_current, strip.left_handle, strip.right_handle - 1
     if not first <= current <= last:
         raise EffectError(rpt_("the current frame is outside the Shutter strip"))
-    if until > max(current, 0):
+    if until and until > current:
         last = min(last, until)
-    elif 0 < until < current:
+    elif until and until < current:
         first = max(first, until)
     return range(current if direction == "FORWARD" else first, (current if direction == "BACKWARD" else last) + 1)
 
