@@ -4,13 +4,10 @@ import json
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-from support import read_picture, write_frames
-
-ROOT = Path(__file__).parents[2]
+from support import ROOT, read_picture, write_frames
 
 
 @pytest.fixture(scope="session")

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO
 
+ROOT = Path(__file__).parents[2]
 EXTENSION = "bl_ext.user_default.virtual_shutter"  # its id where the checkout is linked
 
 
@@ -260,7 +261,7 @@ def python(*arguments, **environment):
     """A Python of its own, with more in its environment, that has ended."""
     return subprocess.run(
         [sys.executable, *map(str, arguments)],
-        cwd=Path(__file__).parents[2],
+        cwd=ROOT,
         env=os.environ | environment,
         capture_output=True,
         text=True,

@@ -9,7 +9,7 @@ from queue import Queue
 import frame_trace
 import numpy as np
 import pytest
-from support import noise, noise_film, picture_of, recipe, write_movie
+from support import ROOT, noise, noise_film, picture_of, recipe, write_movie
 
 from shutter_addon.blender.commands import render_command
 from shutter_addon.blender.data import snapshot
@@ -155,8 +155,7 @@ def test_who_asks_for_room_keeps_what_it_uses(film, monkeypatch):
     asks, opened = [], available.OPEN["cpu"]
     monkeypatch.setitem(available.OPEN, "cpu", lambda memory, ask: asks.append(ask) or opened(memory, ask))
     found = session.RenderSession(lambda: ("cpu", None), lambda: found.free())
-    context = RenderContext(found)
-    request = context.request(*job_snapshots.of(film[2].scene, 1), effect_source.FULL)
+    request = RenderContext(found).request(*job_snapshots.of(film[2].scene, 1), effect_source.FULL)
     found.picture(request)
     renderer = found.renderer(request.source)
     assert not renderer.missing(request)
@@ -169,8 +168,6 @@ def test_who_asks_for_room_keeps_what_it_uses(film, monkeypatch):
 
 
 # The way of a rendered frame: the page that tells it, and how often it comes back to a room
-
-ROOT = Path(__file__).parents[2]
 
 LINE = {"shutter": "S1", "kind": "line", "width": 0.02, "strokes": [[[0.3, 0.2], [0.5, 0.8]]]}
 RECIPE = recipe(8, [1] * 8, [1] + [0] * 7, regions=[LINE], border=True)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support import noise_film, recipe, write_frames, write_movie, write_tone
+from support import ROOT, noise_film, recipe, write_frames, write_movie, write_tone
 
 from shutter_addon.blender import command
 from shutter_addon.blender.data import recipe_import, versions
@@ -21,7 +21,6 @@ from shutter_addon.features.outlines import carrying
 from shutter_addon.media.rendered_pictures import read
 
 FRAMES, WINDOW = 8, 4
-ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture

@@ -45,8 +45,7 @@ def test_trimmed_cut_and_reversed(edit, render, clip_strip, movie):
     source = clip_strip(movie, 40)
     source.left_handle, source.right_handle = 43, 55
     source.use_reverse_frames = True
-    right = source.split(48, "HARD")
-    check(edit, render, right, range(48, 55))
+    check(edit, render, source.split(48, "HARD"), range(48, 55))
 
 
 @pytest.mark.parametrize("channels", [3, 4])
@@ -55,8 +54,7 @@ def test_images(edit, render, tmp_path, clip_strip, channels):
 
 
 def test_start_and_offset_of_images(bpy, edit, render, tmp_path, clip_strip):
-    first = pngs(tmp_path / "in")
-    source = clip_strip(first.with_name("f0003.png"))
+    source = clip_strip(pngs(tmp_path / "in").with_name("f0003.png"))
     source.clip.frame_start, source.clip.frame_offset = 30, 2
     check(edit, render, source, range(1, 8))
 

@@ -8,12 +8,11 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import OpenImageIO
 import pytest
-from support import noise, read_picture, recipe, refused, write_frames, write_movie
+from support import ROOT, noise, read_picture, recipe, refused, write_frames, write_movie
 
 from shutter_addon.blender.commands import command_line
 from shutter_addon.blender.editing import add_effect
@@ -21,7 +20,6 @@ from shutter_addon.core.frames import light
 from shutter_addon.media import MediaError, open_source
 from shutter_addon.media.rendered_pictures import whole_pictures
 
-ROOT = Path(__file__).parents[2]
 STILL = recipe(4, [1, 0, 0, 0])
 
 
@@ -108,8 +106,7 @@ def test_chunks_and_order_change_no_bit(command_here, film, tmp_path):
 def test_exr_is_scene_linear(command_here, film, tmp_path):
     first, frames = film
     command_here(first, "--output", tmp_path / "out", "--format", "exr", "--frames", "1", recipe=recipe(4, np.ones(4)))
-    picture = read_picture(tmp_path / "out" / "0001.exr")
-    assert np.abs(picture - linear(frames[:4]).mean(axis=0)).max() < 1e-3
+    assert np.abs(read_picture(tmp_path / "out" / "0001.exr") - linear(frames[:4]).mean(axis=0)).max() < 1e-3
 
 
 @pytest.fixture(scope="module")

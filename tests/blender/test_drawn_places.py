@@ -107,8 +107,7 @@ def test_a_file_of_before_means_what_it_meant(bpy, region):
     """Where nothing is noted, drawings lie where the region has not moved, until the pen is taken up."""
     region.drawn.clear()
     scene, effect, _strip = selection.active(bpy.context)
-    layer = annotations.layer_of(effect, region)
-    annotations.add_stroke(layer.frames.new(11), SECOND)
+    annotations.add_stroke(annotations.layer_of(effect, region).frames.new(11), SECOND)
     for frame, x in ((1, 0.0), (11, 100 / 640)):
         scene.frame_set(frame)
         region.location = x, 0

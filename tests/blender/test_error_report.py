@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support import effect_of, image_strip, recipe, sequencer, write_frames
+from support import ROOT, effect_of, image_strip, recipe, sequencer, write_frames
 
 from shutter_addon.blender import command
 from shutter_addon.blender.data import selection
@@ -20,7 +20,6 @@ from shutter_addon.blender.output.error_report import without_paths
 from shutter_addon.core import recent_errors
 
 NAME = "Qanarix"
-ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(autouse=True)

@@ -7,9 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support import EXTENSION, KEYED, python, read_picture
+from support import EXTENSION, KEYED, ROOT, python, read_picture
 
-ROOT = Path(__file__).parents[2]
 TRACES = Path(__file__).parent / "traces.py"
 
 

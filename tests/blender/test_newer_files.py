@@ -8,14 +8,13 @@ from pathlib import Path
 
 import pytest
 import stored
-from support import sequencer
+from support import ROOT, sequencer
 
 from shutter_addon.blender import command
 from shutter_addon.blender.data import data_format, preferences, property_copy
 from shutter_addon.blender.editing import reconcile, undelete
 from shutter_addon.core.recipes import recipe_file
 
-ROOT = Path(__file__).parents[2]
 NEWER = Path(__file__).with_name("newer_version.py")
 SENTENCE = '"Edit" was saved by a newer version of Virtual Shutter (9.0.0): what this one does not know'
 
@@ -50,8 +49,7 @@ def newer(bpy, made, tmp_path, capfd):
 
 def test_nothing_of_it_is_lost_by_saving(bpy, newer, made):
     path, edit = newer
-    effect = edit.virtual_shutter.effects[0]
-    assert effect.position == ""
+    assert edit.virtual_shutter.effects[0].position == ""
     bpy.context.view_layer.update()
     for frame in (4, 1):
         edit.frame_set(frame)
@@ -82,9 +80,8 @@ def test_a_recipe_of_it_says_what_it_lacks(bpy, newer, tmp_path, capfd):
     _path, edit = newer
     with sequencer(bpy):
         edit.sequence_editor.active_strip = edit.sequence_editor.strips["combined effect"]
-        out = tmp_path / "recipe.json"
-        assert bpy.ops.shutter.recipe_export(filepath=str(out)) == {"FINISHED"}
-    assert recipe_file.load(out).options.at(1).window == 6
+        assert bpy.ops.shutter.recipe_export(filepath=str(tmp_path / "recipe.json")) == {"FINISHED"}
+    assert recipe_file.load(tmp_path / "recipe.json").options.at(1).window == 6
     assert "Warning: Data of a newer version of Virtual Shutter is left out" in capfd.readouterr().out
 
 

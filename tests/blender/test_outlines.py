@@ -71,8 +71,7 @@ def test_carried(bpy, edited, tmp_path):
     """In between and beyond; turned inside out. Mattes lie beside a file that was saved."""
     strip, effect = edited(region(1, 9))
     for frame in (1, 3, 5, 8, 10):
-        found = coefficients(strip, effect, frame)
-        assert np.abs(found - covered(frame - 1)).mean() < 0.01, frame
+        assert np.abs(coefficients(strip, effect, frame) - covered(frame - 1)).mean() < 0.01, frame
     effect.regions[0].invert = True
     assert np.abs(coefficients(strip, effect, 5) - (1 - covered(4))).mean() < 0.01
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "edit.blend"))

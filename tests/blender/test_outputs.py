@@ -11,13 +11,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support import read_picture, recipe, refused, write_frames
+from support import ROOT, read_picture, recipe, refused, write_frames
 
 from shutter_addon.blender.commands import render_command
 from shutter_addon.media import open_source
 from shutter_addon.media.rendered_pictures import whole_pictures
 
-ROOT = Path(__file__).parents[2]
 STILL = recipe(1, [1])
 
 

@@ -3,17 +3,16 @@
 import json
 import shutil
 import tomllib
-from pathlib import Path
 
 import pytest
 import saved_pictures
 import stored
 from made_recipes import comes_back
+from support import ROOT
 
 from shutter_addon.blender.data import data_format
 from shutter_addon.core.recipes import recipe_file
 
-ROOT = Path(__file__).parents[2]
 SAVED = ROOT / "tests" / "saved"
 
 

@@ -77,8 +77,7 @@ def test_still_frames_beyond_the_content(edit, render, effect_on, movie, percent
 
 
 def test_hard_cut_source(edit, render, effect_on, movie):
-    source = new_movie(edit, movie, start=10)
-    right = source.split(30, "HARD")
+    right = new_movie(edit, movie, start=10).split(30, "HARD")
     strip, _ = effect_on(right)
     check(edit, render, [strip], range(30, 70, 3))
 

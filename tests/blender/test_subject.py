@@ -5,7 +5,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support import effect_of, image_strip, recipe, request, write_frames
+from support import effect_of, image_strip, recipe, write_frames
+from test_outlines import coefficients
 
 from shutter_addon.blender.data import annotations, preferences, selection, snapshot
 from shutter_addon.blender.editing import region_edits
@@ -62,10 +63,6 @@ def overlap(matte, index):
     return (inside & disc(index)).sum() / (inside | disc(index)).sum()
 
 
-def coefficients(strip, effect, frame):
-    return request(strip.id_data, effect, strip, frame).coefficients()[1]
-
-
 def test_one_stroke(bpy, edited):
     """A scribble becomes a subject, which is shown around the disc, and follows it; a scribble again on a click."""
     strip, effect = edited("line", width=0.03)
@@ -103,8 +100,7 @@ def test_saved_and_opened(bpy, edited, tmp_path):
     region = effect.regions[0]
     layers = annotations.layers_of(effect, region)
     assert [[d.frame_number for d in layer.frames] for layer in layers] == [[1], [1], [4]]
-    matte = coefficients(strip, effect, 4)
-    assert matte[30:98, 42:72].mean() > 0.99, "the drawing overrules the model"
+    assert coefficients(strip, effect, 4)[30:98, 42:72].mean() > 0.99, "the drawing overrules the model"
     assert overlap(coefficients(strip, effect, 1), 0) > 0.9
     assert len(list((tmp_path / "virtual_shutter_mattes").glob("*/*.png"))) >= 2
 

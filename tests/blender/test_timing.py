@@ -44,8 +44,7 @@ def test_what_cannot_be_read_is_shown_at_an_even_speed(edit, source, monkeypatch
     told: list[str] = []
     monkeypatch.setattr(render_job.job, "said", set())  # by which a sentence is told once: as a new Blender has it
     monkeypatch.setattr(source_media, "record", unknown)
-    timing = source_media.timing_of(source)
-    assert timing.keys == (known.keys[0], known.keys[-1])
+    assert source_media.timing_of(source).keys == (known.keys[0], known.keys[-1])
     strip, _effect = started(edit, source)
     for frame in (2, 3):
         picture_of(strip.scene, frame, told.append)

@@ -4,19 +4,17 @@ import json
 import os
 import subprocess
 import sys
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support import recipe, write_frames
+from support import ROOT, recipe, write_frames
 
 from shutter_addon.core.model import motions
 from shutter_addon.core.model.keyframes import Constant
 from shutter_addon.core.recipes import recipe_file
 from shutter_addon.features.tracking import camera_tracking, tracking
 
-ROOT = Path(__file__).parents[2]
 WIDTH, HEIGHT, COUNT = 160, 120, 12
 CROSS = [[[0.35, 0.5], [0.65, 0.5]], [[0.5, 0.35], [0.5, 0.65]]]
 
@@ -24,8 +22,7 @@ CROSS = [[[0.35, 0.5], [0.65, 0.5]], [[0.5, 0.35], [0.5, 0.65]]]
 @pytest.fixture(scope="module")
 def film(tmp_path_factory):
     """A textured wall that goes 3 pixels to the right and 1 up with every frame, on images."""
-    rng = np.random.default_rng(5)
-    wall = rng.integers(0, 256, (40, 50, 3)).repeat(5, 0).repeat(5, 1).astype(np.uint8)
+    wall = np.random.default_rng(5).integers(0, 256, (40, 50, 3)).repeat(5, 0).repeat(5, 1).astype(np.uint8)
     views = [wall[20 + n : 20 + n + HEIGHT, 60 - 3 * n : 60 - 3 * n + WIDTH] for n in range(COUNT)]
     return write_frames(tmp_path_factory.mktemp("wall"), np.stack(views))
 

@@ -191,8 +191,7 @@ def test_what_nobody_renders_does_not_matter(bpy, edit, effect):
     for layer, shutter in (("none", "Sharp"), ("Face", "none")):
         region = effect.regions.add()
         region.name, region.layer, region.shutter = "Face", layer, shutter
-    other = edit.virtual_shutter.effects.add()
-    other.name = effect.name
+    edit.virtual_shutter.effects.add().name = effect.name
     effect = edit.virtual_shutter.effects[0]
     assert selection.active_shutter(effect) is selection.active_region(effect) is None
     assert np.array_equal(picture_of(effect.scene, 4), before)

@@ -149,8 +149,7 @@ def test_long_windows_of_shutters_far_apart(count):
 
 
 def test_still_frame_is_exact_to_the_bit_at_8_bits(device):
-    rng = np.random.default_rng(10)
-    source = footage(rng)
+    source = footage(np.random.default_rng(10))
     bars = np.zeros((1, 8))
     bars[0, 2] = 0.3
     for index in (5, 0, 19):

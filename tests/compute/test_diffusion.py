@@ -69,9 +69,9 @@ def hole_in_a_wall():
     return labels, 3
 
 
-def spiral(gap):
-    labels = blank(256, 256)
-    a, b = 0, 255
+def spiral(gap, side=256):
+    labels = blank(side, side)
+    a, b = 0, side - 1
     while b - a > 2 * gap:
         labels[a, a : b + 1], labels[a : b + 1, b] = 1, 2
         labels[b, a + gap : b + 1], labels[a + gap : b + 1, a + gap] = 1, 2
@@ -79,10 +79,10 @@ def spiral(gap):
     return labels, 2
 
 
-def maze(gap):
+def maze(gap, side=256):
     """Long corridors between walls of two shutters, and a pixel of a third where they start."""
-    labels = blank(256, 256)
-    for k, y in enumerate(range(gap, 256, gap)):
+    labels = blank(side, side)
+    for k, y in enumerate(range(gap, side, gap)):
         labels[y, slice(0, -gap) if k % 2 else slice(gap, None)] = 1 + (k % 3 == 0)
     labels[0, 0] = 3
     return labels, 3
@@ -162,11 +162,11 @@ def both(on_moderngl):
     return (diffuse, LEVEL / 2), (on_moderngl, LEVEL)
 
 
-def assert_coefficients(got, count, shape):
+def assert_coefficients(got, count, shape, error=1e-6):
     assert got.shape == (count, *shape)
     assert got.dtype == np.float32
     assert got.min() >= 0
-    np.testing.assert_allclose(got.sum(axis=0), 1, atol=1e-6)
+    np.testing.assert_allclose(got.sum(axis=0), 1, atol=error)
 
 
 @pytest.mark.parametrize("scene", SCENES)

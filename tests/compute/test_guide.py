@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy import ndimage
-from test_composition import Footage, few_pieces
+from test_composition import LEVEL, SHAPES, Footage, few_pieces
 from test_shots import BETWEEN, STEP, film, with_between
 
 from shutter_addon.compute import guide
@@ -11,16 +11,12 @@ from shutter_addon.compute.cpu import CPUCompositor
 from shutter_addon.compute.renderer import Renderer
 from shutter_addon.compute.request import Request
 from shutter_addon.core.model.frame_state import FrameState, Options
-from shutter_addon.core.model.scribbles import Shape
 from shutter_addon.media.cuts import ShotSource
-
-LEVEL = 1 / 255
 
 
 def texture(height, width, seed=0, rows=48) -> np.ndarray:
     """Smooth display values (height, width, 3), 0 to 1, between random ones in so many rows."""
-    rng = np.random.default_rng(seed)
-    coarse = rng.random((rows, rows * width // height, 3))
+    coarse = np.random.default_rng(seed).random((rows, rows * width // height, 3))
     y, x = ((np.arange(n) + 0.5) * rows / height - 0.5 for n in (height, width))
     at = np.meshgrid(y, x, indexing="ij")
     return np.stack([ndimage.map_coordinates(coarse[..., k], at, order=1, mode="nearest") for k in range(3)], -1)
@@ -103,14 +99,8 @@ def test_those_beside_are_filmed_frames_of_the_shot():
     assert guide.guiding(17, 8, range(99)) == (17, 8, 16, 24, 32)
 
 
-SHAPES = (
-    Shape(1, "line", 0.1, (np.array([[0.1, 0.2], [0.7, 0.3]]),)),
-    Shape(2, "lasso", 0.0, (np.array([[0.6, 0.6], [0.9, 0.6], [0.8, 0.9]]),)),
-)
-
-
 def guided(rng, window=6, strength=1.0, **options):
-    return few_pieces(rng, window, shapes=SHAPES, edge_aware=strength, **options)
+    return few_pieces(rng, window, shapes=SHAPES[:2], edge_aware=strength, **options)
 
 
 class Cut(ShotSource):
@@ -145,8 +135,7 @@ def test_at_0_nothing_more_is_read():
     other = FrameState(Options(4, border=True), still.bars, SHAPES[:1])
     assert reads(still, "picture") == reads(other, "picture") == [3]
     assert reads(other, "coefficients") == []
-    options = Options(4, border=True, edge_aware=0.5)
-    along_edges = FrameState(options, still.bars, SHAPES[:1])
+    along_edges = FrameState(Options(4, border=True, edge_aware=0.5), still.bars, SHAPES[:1])
     assert sorted(reads(along_edges, "coefficients")) == [1, 2, 3, 4, 5]
     everywhere = FrameState(Options(4, edge_aware=0.5), still.bars, SHAPES[:1])  # there is one shutter alone
     assert reads(everywhere, "picture") == [3]

@@ -115,8 +115,7 @@ BETWEEN = [0, 27, 51, 85]  # the middle one of a cut's pair of filmed frames, as
 
 def with_between(dtype=np.uint8) -> Footage:
     filmed = film(dtype).frames
-    rng = np.random.default_rng(48)
-    noise = rng.random((len(filmed) * STEP - STEP + 1, *filmed.shape[1:]))
+    noise = np.random.default_rng(48).random((len(filmed) * STEP - STEP + 1, *filmed.shape[1:]))
     every = (noise * 255).astype(np.uint8) if dtype == np.uint8 else noise.astype(dtype)
     every[..., 3] = filmed[0, 0, 0, 3]
     every[::STEP] = filmed

@@ -62,8 +62,7 @@ KINDS += [(kind, np.float16) for kind in (plain, followed, with_mattes)]
 @pytest.mark.parametrize(("kind", "dtype"), KINDS)
 def test_what_comes_after_is_whole(device, kind, dtype, monkeypatch):
     monkeypatch.setattr(window, "BAND_BYTES", 60_000)  # pictures take several passes
-    rng = np.random.default_rng(50)
-    source = footage(rng, count=40, dtype=dtype, size=(61, 47))
+    source = footage(np.random.default_rng(50), count=40, dtype=dtype, size=(61, 47))
     moments = [kind(np.random.default_rng(seed), source, shapes) for seed, shapes in ((51, SHAPES), (52, OTHER))]
     values = Values(source)
     asked = list(zip((FIRST, SECOND), moments, strict=True))
@@ -91,8 +90,7 @@ def test_a_quick_picture_starts_from_nothing_half_made(gpu_device):
     from shutter_addon.compute.gpu import GPUCompositor
 
     compositor = GPUCompositor(gpu_device)
-    rng = np.random.default_rng(53)
-    source = footage(rng, count=12, size=(61, 47))
+    source = footage(np.random.default_rng(53), count=12, size=(61, 47))
     before, after = (plain(np.random.default_rng(54), source, shapes) for shapes in (SHAPES, OTHER))
     renderer = Renderer(compositor, source)
     right = renderer.coefficients(Request(0, after))

@@ -77,8 +77,7 @@ def test_a_name_has_one_holder(worker):
     workers = [worker() for _ in range(3)]
     for each in workers:
         each.ask(*names)
-    took = [each.took() for each in workers]
-    assert sorted(chain.from_iterable(took)) == names
+    assert sorted(chain.from_iterable(each.took() for each in workers)) == names
 
 
 def test_a_killed_holders_claim_goes_to_one_alone(worker):

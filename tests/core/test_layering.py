@@ -53,14 +53,12 @@ def test_keys_are_equal_for_equal_layers_alone():
     same, other = layers(found)[1], layers(effect(LINE | {"layer": True}))[1]
     assert layers(found)[1].key == same.key != other.key
     assert same.key_at(20) == layers(found, 22.0)[1].key_at(20)
-    half = dataclasses.replace(same, opacities=(0.5,))
-    assert half.key != same.key
+    assert dataclasses.replace(same, opacities=(0.5,)).key != same.key
 
 
 def test_too_many_points_are_refused():
-    strokes = [[[0.1, 0.1]] * limits.MAX_POINTS]
     found = effect(LINE | {"layer": True}, LINE | {"name": "Other"})
-    drawings = dataclasses.replace(found.regions[1].drawings, strokes=([np.array(strokes[0])],))
+    drawings = dataclasses.replace(found.regions[1].drawings, strokes=([np.full((limits.MAX_POINTS, 2), 0.1)],))
     region = dataclasses.replace(found.regions[1], drawings=drawings)
     with pytest.raises(EffectError, match="more than"):
         layers(dataclasses.replace(found, regions=(found.regions[0], region)))

@@ -96,8 +96,7 @@ def test_on_the_way_from_one_frame_to_the_next_a_sharp_frame_is_a_moment(directi
 @pytest.mark.parametrize("steps", STEPS)
 @pytest.mark.parametrize("direction", [1, -1])
 def test_a_threshold_counts_the_frame_that_is_shown(direction, steps, position, edges):
-    bars = [0, 0, 1, 0]
-    shutter = {"bars": bars, "combine": "lightest", "threshold": 0.5, "softness": 0}
+    shutter = {"bars": [0, 0, 1, 0], "combine": "lightest", "threshold": 0.5, "softness": 0}
     index, found = state([shutter], steps, direction=direction, position=position, edges=edges)
     assert windows.positions(found.options, index, direction)[found.options.shown] == index
     first, last = found.open_span

@@ -93,7 +93,6 @@ def test_a_straight_way_needs_its_ends_alone_and_a_bent_one_its_bends():
         return Placement((0.01 * abs(n - 30), 0.0), 2.0 * n, 1 + 0.01 * n)
 
     offsets = np.array([[0.05, 0.0], [-0.05, 0.1]])
-    track = {n: at(n) for n in range(61)}
-    assert motions.thinned(track, offsets, (1920, 1080)) == [0, 30, 60]
+    assert motions.thinned({n: at(n) for n in range(61)}, offsets, (1920, 1080)) == [0, 30, 60]
     assert motions.thinned({n: at(n) for n in range(31)}, offsets, (1920, 1080)) == [0, 30]
     assert motions.thinned({n: at(n) for n in range(31)}, offsets, (1920, 1080), {7, 90}) == [0, 7, 30]

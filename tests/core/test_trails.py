@@ -111,8 +111,7 @@ def exposed(bars, speed=1.0, direction=1, here=100.0, after=None, before=None, *
 def test_as_it_was_filmed_and_slower_it_is_the_shown_frame():
     """Of moments, half the speed is two of four; a quarter more speed than filmed goes into the next frame."""
     for speed in (1, 0.3, 0):
-        bars = exposed(OPEN, speed)
-        np.testing.assert_allclose(bars, [8, 0, 0, 0, 0, 0, 0, 0], atol=1e-9)
+        np.testing.assert_allclose(exposed(OPEN, speed), [8, 0, 0, 0, 0, 0, 0, 0], atol=1e-9)
     np.testing.assert_allclose(exposed(OPEN, 2, step=4), [4, 4, 0, 0, 0, 0, 0, 0])
     np.testing.assert_allclose(exposed(OPEN, 5, step=4), [1.6] * 5 + [0, 0, 0])
 
@@ -125,8 +124,7 @@ def test_a_freeze_is_the_shown_frame(position):
         bars = exposed(OPEN, 0, direction, position=position, step=4)
         assert np.flatnonzero(bars).tolist() == [options.before + place]
     for window in (1, 2, 3):
-        bars = exposed([1] * window, 0, -1, step=4)
-        assert bars.tolist() == [0] * (window - 1) + [window]
+        assert exposed([1] * window, 0, -1, step=4).tolist() == [0] * (window - 1) + [window]
 
 
 @given(

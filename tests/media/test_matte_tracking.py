@@ -32,8 +32,7 @@ def test_a_turn_is_found_where_it_is_asked_for(motion):
     (first, before), (second, after) = scene(0, turn=4), scene(1, turn=4)
     found = matte_tracking.moved(first, second, before, after, motion).motion
     assert abs(found(120 + 110j) - (123 + 109j)) < 0.5
-    turn = np.degrees(np.angle(found.turn))
-    assert turn == pytest.approx(-4, abs=0.4)
+    assert np.degrees(np.angle(found.turn)) == pytest.approx(-4, abs=0.4)
     assert abs(found.turn) == pytest.approx(1, abs=0.01)
 
 
@@ -58,12 +57,8 @@ class Still:
         return np.array([0.4, 0.4])
 
 
-def covers(cover):
-    return lambda frame, _size: cover(frame)
-
-
 def follow(cover, start, frames):
-    track = matte_tracking.MatteTrack(Still(), covers(cover))
+    track = matte_tracking.MatteTrack(Still(), lambda frame, _size: cover(frame))
     return list(track.follow(Footage(), start, frames, motion="location"))
 
 

@@ -114,8 +114,7 @@ def test_its_ends():
 
 def test_moments_come_with_the_frames_around_them():
     """Which are sent once for all of a pair, and of which a device makes the moment."""
-    film = Panned()
-    source = SmoothSource(film, 4)
+    source = SmoothSource(Panned(), 4)
     moments = [source.decoded(index) for index in (9, 10, 11)]
     assert [(each.pair, each.number, each.steps) for each in moments] == [((2, 3), k, 4) for k in (1, 2, 3)]
     for each, index in zip(moments, (9, 10, 11), strict=True):

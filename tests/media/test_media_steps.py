@@ -35,8 +35,7 @@ def shift(x, y=0.0):
 
 @pytest.mark.parametrize(("x", "y"), [(0, 0), (0.5, 0), (1, 1), (3, 0), (0, -8), (20, 10), (40, 0)])
 def test_a_shift_is_found(x, y):
-    film = Film(shift(x, y))
-    found = smooth.step(smooth.moved(film, 1), STILL, STILL) * 540
+    found = smooth.step(smooth.moved(Film(shift(x, y)), 1), STILL, STILL) * 540
     assert found == pytest.approx(np.hypot(x, y), abs=0.1 + 0.03 * np.hypot(x, y))
 
 
@@ -59,8 +58,7 @@ def test_what_is_followed_stands_still_and_the_rest_moves():
     film = Film(shift(0), subject=lambda k: (300 + 10 * k, 150))
     ways = Similarity(1, 10 / 540), Similarity(1, 20 / 540)
     assert smooth.step(smooth.moved(film, 1), *ways) * 540 == pytest.approx(10, abs=0.5)
-    whole = Film(shift(10))
-    assert smooth.step(smooth.moved(whole, 1), *ways) * 540 == pytest.approx(0, abs=0.2)
+    assert smooth.step(smooth.moved(Film(shift(10)), 1), *ways) * 540 == pytest.approx(0, abs=0.2)
 
 
 def test_a_turn_is_followed():
@@ -77,10 +75,9 @@ def test_a_turn_is_followed():
 
 
 def test_nothing_is_told_across_a_cut_nor_by_few_pixels():
-    rng = np.random.default_rng(1)
     film = Film(shift(0))
     first, second = film.read(0), np.flip(film.read(0), (0, 1)).copy()
-    second[..., :3] = rng.integers(0, 256, second[..., :3].shape, dtype=np.uint8)
+    second[..., :3] = np.random.default_rng(1).integers(0, 256, second[..., :3].shape, dtype=np.uint8)
     film.read = lambda index: (first, second)[index]
     assert smooth.moved(film, 0) is None
     assert smooth.moved(Film(shift(1), size=(20, 8)), 0) is None

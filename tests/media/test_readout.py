@@ -26,8 +26,7 @@ def pictures(share, motion=lambda t: 35 * np.sin(t / 3), *, poles=POLES, noise=0
 
 @pytest.mark.parametrize("share", [0, 0.1, 0.8, -0.5])
 def test_a_readout_is_found(share):
-    found = readout.of_pictures(list(pictures(share, noise=2)))
-    assert found == pytest.approx(share, rel=0.05, abs=0.01)
+    assert readout.of_pictures(list(pictures(share, noise=2))) == pytest.approx(share, rel=0.05, abs=0.01)
 
 
 def test_of_a_camera_that_shakes_and_of_things_that_pass_each_at_its_own_speed():

@@ -158,8 +158,7 @@ def test_what_is_tracked_lies_within_a_pixel(subject, ground, name, kind):
     tracked, faults = followed(source, kind, 10)
     assert not faults
     assert sorted(tracked) == list(range(24))
-    off = errors(tracked, truth, kind)
-    assert max(off.values()) <= 1
+    assert max(errors(tracked, truth, kind).values()) <= 1
     assert len(sure(tracked)) >= least
 
 
@@ -202,8 +201,7 @@ def test_a_subject_without_corners_is_never_sure(subject, ground):
     smooth = cv2.GaussianBlur(subject, (0, 0), 30) // 2 + 60
     source, truth = film(smooth, np.roll(ground, 60, axis=1), lambda t: (3 * t,), 10, 4)
     tracked, _ = followed(source, "line", 4)
-    off = errors(tracked, truth, "line")
-    assert max(off.values()) > 2
+    assert max(errors(tracked, truth, "line").values()) > 2
     assert sure(tracked) == {4}
 
 

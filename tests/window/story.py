@@ -104,8 +104,7 @@ def movie_added():
 def effect_added():
     yield from driver.effect_added()
     assert [shutter.name for shutter in effect().shutters] == ["Long", "Sharp"]
-    sidebar = driver.region_of(driver.area_of("SEQUENCE_EDITOR", "PREVIEW"), "UI")
-    yield from driver.until(lambda: sidebar.active_panel_category == "Shutter", "the Shutter tab opens")
+    yield from driver.until(lambda: sidebar().active_panel_category == "Shutter", "the Shutter tab opens")
     all_viewed()
     yield 0.5
 
@@ -163,14 +162,12 @@ def bars():
 
 def bars_dragged(points, hold=()):
     before = bars()
-    region = preview()
-    yield from driver.drag(region, points, hold)
+    yield from driver.drag(preview(), points, hold)
     assert bars() != before, "the bars did not change"
 
 
 def keyed():
-    region = preview()
-    driver.move(region, 60, 60)
+    driver.move(preview(), 60, 60)
     yield 0.4
     driver.key("i")
     yield 0.5

@@ -9,6 +9,7 @@ import driver
 import first_stroke_story as first
 import story
 from driver import part
+from one_stroke_story import region
 from story import sidebar
 
 # Of the footage's frame 6, in fractions of the picture: down the bunny.
@@ -21,10 +22,6 @@ def folder_shown():
     area = driver.area_of("FILE_BROWSER")
     area.spaces.active.params.directory = os.fsencode(Path(story.FOOTAGE).parent)
     yield 2.0
-
-
-def region():
-    return story.effect().regions[0]
 
 
 def is_carrying():

@@ -5,14 +5,14 @@ motion, and corrected by the network again. Outlines that the user draws overrul
 al. 2020, "U²-Net: Going deeper with nested U-structure for salient object detection").
 
 Frames with strokes or drawings are keyframes. From each of them a chain of mattes goes forward and backward, as far as
-the next keyframe or cut. A matte is made of the one before it in its chain, and a file keeps it; so it is the same
-wherever a process begins. Between two keyframes, both chains are mixed in the middle.
+the next keyframe or cut. A matte is made of the footage and the one before it in its chain, and a file keeps it; so it
+is the same wherever a process begins. Between two keyframes, both chains are mixed in the middle.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -29,7 +29,7 @@ from ...media import derived, flow, opencv
 from ...media.files import MODEL
 from ...media.image_writing import write_levels
 from ...media.opencv import cv2
-from . import carrying
+from . import carrying, still_background
 from .carried_mattes import CONFIDENCE, CarriedMattes, Drawings, nearest
 
 MEAN, DEVIATION = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)  # of the colors that such networks are trained with
@@ -45,11 +45,13 @@ LARGEST = 0.9  # share of the picture from which on a mask is no subject
 SOFT = 3  # pixels of the working picture by which soft edges go beyond the contour of a part
 WIDTH = 0.01  # of a stroke, in parts of the picture's height
 SHARED = 0.2  # share of a part that the carried matte has to cover
-# How far the network and the carried matte agree: below that the network is not believed, and above it is.
-BELIEVED, MOST = (0.5, 0.7), 0.7
+# How far the network and the carried matte agree: below the first the network is not believed, above the second it is,
+# so far as the third says. What it finds in a picture without the background is believed sooner, and more.
+BELIEVED, CLEARED = (0.5, 0.7, 0.7), (0.3, 0.7, 0.9)
 # Of the confidence: how sure the network is, how far it agrees, from none to full; the pixels of the working picture
 # below which a subject is small; and how much it may rise from frame to frame, as what was lost seldom comes back.
 UNSURE, UNLIKE, SMALL, RISES = (0.85, 0.95), (0.5, 0.8), 3000, 0.05
+CERTAIN = 0.8  # how certain the network has to be, or else it looks again
 # By how many pixels of the working picture a place moves rather with the ground than with the subject, and how far its
 # colors may differ from before, in units of CIE Lab.
 WITH, SAME = 0.25, 8.0
@@ -225,7 +227,12 @@ def _confidence(share: np.ndarray, sure: float, agrees: float = 1.0) -> float:
             1.
     """
     size = np.count_nonzero(share > INSIDE) / SMALL
-    return float(_from(sure, UNSURE) * _from(agrees, UNLIKE) * min(size, 1.0) ** 0.5)
+    return _certain(sure, agrees) * min(size, 1.0) ** 0.5
+
+
+def _certain(sure: float, agrees: float) -> float:
+    """Return how certain a subject is, 0 to 1, of which the network is so sure, and agrees so far with motion."""
+    return _from(sure, UNSURE) * _from(agrees, UNLIKE)
 
 
 def _from(value: float, ends: tuple[float, float]) -> float:
@@ -288,13 +295,24 @@ def _alone(answer: np.ndarray, keep: np.ndarray) -> np.ndarray:
     return np.where(keep | (_near(keep) & (answer <= INSIDE)), answer, np.float32(0))
 
 
-def followed(network: Network, before: np.ndarray, picture: np.ndarray, subject: Found) -> tuple[Found, np.ndarray]:
+def followed(
+    network: Network,
+    before: np.ndarray,
+    picture: np.ndarray,
+    subject: Found,
+    behind: Callable[[], np.ndarray | None] = lambda: None,
+) -> tuple[Found, np.ndarray]:
     """Follow a subject to the next frame: carry it there by optical flow, and correct it by the network.
+
+    If the two do not agree and the camera stands still, the network looks once more, at a picture without the
+    background.
 
     Args:
         before: Working picture of the frame where the subject is known, (h, w, 3) uint8.
         picture: Working picture of the next frame (earlier in time if a chain goes backward), (h, w, 3) uint8.
         subject: The subject in the frame `before`.
+        behind: Returns the background of the next frame, (h, w, 3) uint8, or None (StillBackground.behind). It is asked
+            only if the network is not certain.
 
     Returns:
         The subject in the next frame. Its confidence is 0 if nothing of it is left in the picture.
@@ -307,20 +325,19 @@ def followed(network: Network, before: np.ndarray, picture: np.ndarray, subject:
     carried, excluded = (flow.look(each, grid + back) for each in (subject.share, subject.excluded))
     if not (carried > INSIDE).any():
         return Found(carried, excluded, 0.0), np.zeros_like(carried)
-    answer = network.within(picture, around(carried > INSIDE, ROOM), QUICK) * (1 - excluded)
     colors, old = carrying.lab(picture), carrying.lab(before)
     differ, rest = (carrying.apart(colors, each) for each in (old, np.stack([flow.look(p, grid + back) for p in old])))
-    # What passes does not become a part of the subject, except where its edge may lie a pixel off.
     passes = _passing(grid + back, carried, rest)
-    answer -= passes * np.maximum(answer - cv2.dilate(carried, np.ones((3, 3), np.uint8)), 0)
-    _, parts = cv2.connectedComponents((answer > INSIDE).astype(np.uint8))
-    sizes = np.bincount(parts.ravel())
-    keep = np.bincount(parts.ravel(), weights=(carried > INSIDE).ravel()) >= SHARED * sizes
-    keep[0] = False
-    answer = _alone(answer, keep[parts])
-    agrees = float(np.minimum(answer, carried).sum() / max(np.maximum(answer, carried).sum(), 1e-6))
-    sure = float(answer[answer > INSIDE].mean()) if (answer > INSIDE).any() else 0.0
-    trust = MOST * _from(agrees, BELIEVED)
+    believed, (answer, agrees, sure) = BELIEVED, _looked(network, picture, carried, excluded, passes)
+    doubted = _certain(sure, agrees) < CERTAIN and still_background.same_view(before, picture)
+    if doubted and (background := behind()) is not None:
+        clear = still_background.cleared(picture, background, old, subject.share, grid + back)
+        if clear is not None and 2 * np.sum(clear[1] > INSIDE) > np.sum(carried > INSIDE):
+            passing = np.maximum(passes, clear[2])
+            again = _looked(network, *clear[:2], excluded, passing)
+            if again[1] * again[2] > agrees * sure:
+                believed, carried, passes, (answer, agrees, sure) = CLEARED, clear[1], passing, again
+    trust = believed[2] * _from(agrees, believed[:2])
     # What passes does not stay a part either, if the network sees none there.
     share = carried + np.maximum(np.float32(trust), passes * (answer < carried)) * (answer - carried)
     moved = np.hypot(back[..., 0], back[..., 1])
@@ -328,6 +345,34 @@ def followed(network: Network, before: np.ndarray, picture: np.ndarray, subject:
     still = carrying.stillness(moved, colors, old)
     confidence = min(_confidence(share, sure, agrees), subject.confidence + RISES)
     return Found(share, excluded, confidence), still
+
+
+def _looked(
+    network: Network, picture: np.ndarray, carried: np.ndarray, excluded: np.ndarray, passes: np.ndarray
+) -> tuple[np.ndarray, float, float]:
+    """Let the network look where motion has carried a subject, and choose what belongs to it.
+
+    Args:
+        picture: What the network sees, a working picture (h, w, 3) uint8.
+        carried: The subject's share of each pixel, as motion has carried it here from the frame before, (h, w), 0 to 1,
+            above INSIDE somewhere.
+        excluded: What strokes have marked as not belonging to it, (h, w), 0 to 1.
+        passes: How sure it is that each pixel shows something else that passes, (h, w), 0 to 1.
+
+    Returns:
+        The network's answer, (h, w), 0 to 1, with only the parts that `carried` covers; how far the two overlap, 0 to
+        1; and how sure the network is, 0 to 1.
+    """
+    answer = network.within(picture, around(carried > INSIDE, ROOM), QUICK) * (1 - excluded)
+    # What passes does not become a part of the subject, except where its edge may lie a pixel off.
+    answer -= passes * np.maximum(answer - cv2.dilate(carried, np.ones((3, 3), np.uint8)), 0)
+    _, parts = cv2.connectedComponents((answer > INSIDE).astype(np.uint8))
+    sizes = np.bincount(parts.ravel())
+    keep = np.bincount(parts.ravel(), weights=(carried > INSIDE).ravel()) >= SHARED * sizes
+    keep[0] = False
+    answer = _alone(answer, keep[parts])
+    agrees = float(np.minimum(answer, carried).sum() / max(np.maximum(answer, carried).sum(), 1e-6))
+    return answer, agrees, float(answer[answer > INSIDE].mean()) if (answer > INSIDE).any() else 0.0
 
 
 def _passing(places: carrying.Places, carried: np.ndarray, rest: np.ndarray) -> np.ndarray:
@@ -363,7 +408,7 @@ def around(where: np.ndarray, room: float) -> Box:
     return box_around(area, reach) or tight
 
 
-VERSION = 2  # raise it when mattes of the same strokes change
+VERSION = 3  # raise it when mattes of the same strokes change
 EXCLUDED = 1  # the level of what strokes say that the subject is not
 MIDDLE = 3.0  # the part of a span between two keyframes in which both of their chains count is a third
 STEEPER = 3.0
@@ -587,7 +632,8 @@ class SubjectMattes(CarriedMattes):
         if hidden.any():
             excluded = flow.resized(hidden.astype(np.float32), size)
         share = flow.resized(matte, size).astype(np.float32) / 255
-        what, still = followed(self._network, old, small, Found(share, excluded, sure))
+        found_before = Found(share, excluded, sure)
+        what, still = followed(self._network, old, small, found_before, lambda: self._background.behind(frame, small))
         found_there = refined(picture, what.share)
         found_there += _fitted(still, matte) * (matte / np.float32(255) - found_there)
         # A chain is no surer of what it follows than its keyframe is.
@@ -607,6 +653,15 @@ class SubjectMattes(CarriedMattes):
         mattes = SubjectMattes(self._source, drawings, self._parent, subject, self._model)
         share = flow.resized(mattes.read(frame), carrying.working_size(self.width, self.height))
         return Found(share, np.zeros_like(share), mattes.confidence(frame) or 0.0)
+
+    @cached_property
+    def _background(self) -> still_background.StillBackground:
+        shots, size = self._shots, carrying.working_size(self.width, self.height)
+
+        def picture(frame: int) -> np.ndarray:  # without `self`: a cycle would keep frames in memory
+            return flow.resized(flow.displayed(shots.read(frame), shots.transfer, shots.alpha), size)
+
+        return still_background.StillBackground(picture, self.count)
 
     @cached_property
     def _network(self) -> Network:

@@ -1,0 +1,82 @@
+"""The background behind what moves, where the camera stands still."""
+
+import cv2
+import numpy as np
+import pytest
+from test_subject_mattes import Footage, iou
+
+from shutter_addon.core.messages import MediaError
+from shutter_addon.features.outlines import carrying
+from shutter_addon.features.outlines.still_background import StillBackground, cleared
+from shutter_addon.features.outlines.subject_mattes import CarriedFile, MarkedSubject
+from shutter_addon.media import flow
+
+WIDTH, HEIGHT, COUNT = 240, 160, 32
+WALL = cv2.resize(np.random.default_rng(2).integers(198, 208, (20, 40, 3), np.uint8), (WIDTH + 80, HEIGHT))
+
+
+def body(frame):
+    mask, x, y = np.zeros((HEIGHT, WIDTH), np.uint8), 40 + 6 * frame, 100 - round(30 * np.sin(frame / 5))
+    cv2.ellipse(mask, (x, y), (24, 12), -25 * np.cos(frame / 5), 0, 360, 1, -1)
+    return cv2.circle(mask, (x + 24, y - 12), 9, 1, -1) > 0, (x, y)
+
+
+def picture(frame, pan=0):
+    """A pale animal before a wall that is hardly darker, beside a blue pillar."""
+    shown, (mask, (x, y)) = WALL[:, frame * pan : frame * pan + WIDTH].copy(), body(frame)
+    shown[10:150, 20:60], shown[mask] = (60, 70, 150), (226, 220, 208)
+    cv2.circle(shown, (x - 6, y - 2), 6, (185, 150, 120), -1)
+    noise = 1.5 * np.random.default_rng(frame).standard_normal(shown.shape)
+    return np.rint(np.clip(cv2.GaussianBlur(shown, (0, 0), 1.2) + noise, 0, 255)).astype(np.uint8)
+
+
+def test_a_subject_that_is_hardly_seen_is_followed(tmp_path):
+    x, y = body(3)[1]
+    stroke = np.array([(x - 16, HEIGHT - y), (x + 14, HEIGHT - y)]) / (WIDTH, HEIGHT)
+    footage, marked = Footage(tmp_path, count=COUNT, shows=picture), MarkedSubject({3: [stroke]}, {})
+    mattes = CarriedFile(footage, (), tmp_path / "mattes", marked).open()
+    assert min(iou(mattes.read(frame), body(frame)[0]) for frame in (6, 8)) > 0.95
+
+
+def shots(frame):
+    """Half of the samples show what lies behind a cut, and can be read."""
+    if frame == 30:
+        raise MediaError("damaged")
+    return picture(frame) if frame > 13 else 255 - picture(frame)
+
+
+def test_the_background_is_that_of_the_shot():
+    asked = StillBackground(shots, COUNT)
+    assert asked.behind(8, shots(8)) is None
+    found = asked.behind(24, shots(24))
+    np.testing.assert_array_equal(found, StillBackground(shots, COUNT).behind(24, shots(24)))
+    differ = np.abs(found.astype(float) - cv2.GaussianBlur(WALL[:, :WIDTH], (0, 0), 1.2))[:, 70:].max(axis=2)
+    assert np.percentile(differ, 97) < 6  # at few places, the animal is in half of the samples
+
+
+@pytest.mark.parametrize(("count", "pan"), [(COUNT, 2), (1, 0), (7, 0)])
+def test_without_enough_frames_of_a_view_there_is_none(count, pan):
+    def shown(frame):
+        return cv2.applyColorMap(picture(frame, pan), cv2.COLORMAP_HSV)
+
+    assert StillBackground(shown, count).behind(count // 2, shown(count // 2)) is None
+
+
+def test_it_reads_a_few_frames_around():
+    read = []
+    StillBackground(lambda frame: read.append(frame) or WALL, 1000).behind(500, WALL)
+    assert len(read) == 16
+    assert 372 < min(read) < 470 < 530 < max(read) < 628
+
+
+def test_what_is_no_part_of_the_subject_is_cleared():
+    white, places = np.full((288, 512, 3), 255, np.uint8), flow.grid(288, 512)
+    now, before, share = white.copy(), white.copy(), np.zeros((288, 512), np.float32)
+    share[10:30, 10:40] = 1
+    before[10:30, 10:40] = now[10:30, 14:44] = 160, 40, 40
+    before[40:55, 60:80] = now[40:55, 60:80] = 40, 40, 160
+    faded, carried, others = cleared(now, white, carrying.lab(before), share, places)
+    assert (faded[10:30, 14:44] == now[10:30, 14:44]).all()
+    assert (faded[40:55, 60:80] == 255).all()
+    assert (carried[20, 12], carried[20, 20], others[50, 70]) == (0, 1, 1)
+    assert cleared(before, before, carrying.lab(before), share, places) is None  # it may have stood there all the time
