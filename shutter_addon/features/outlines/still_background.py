@@ -1,6 +1,6 @@
-"""Find what moves before the background, in footage from a camera that stands still.
+"""Find the background of footage from a camera that stands still, and what is in front of it.
 
-At most times, nothing stands before a given pixel of the background. So the median of frames that are some time apart
+At most times, nothing is in front of a given pixel of the background. So the median of frames that are some time apart
 shows the background alone.
 """
 
@@ -19,15 +19,15 @@ from . import carrying
 
 SAMPLES, APART = 16, 8  # frames that are sampled, and how many frames they are apart at most
 THIN = 4  # every so many pixels tell whether the camera stands still
-# Levels of 255 by which noise changes a pixel at most; the share of pixels that change no more while the camera stands
-# still; and how many samples have to show the same view.
+# Levels of 255 by which noise changes a pixel at most; the least share of pixels that change no more if the camera
+# stands still; and how many samples have to show the view of the frame.
 NOISE, SAME, ENOUGH = 4, 0.7, SAMPLES // 2
-# How far colors differ from the background where nothing is before it, and where something surely is, in units of CIE
-# Lab, its L halved. What is darker counts less, as shadows are no part of what casts them.
+# How far colors differ from the background, in units of CIE Lab, its L halved: at most where it is visible, and at
+# least where something is surely in front of it. The third is a factor for darker pixels, which may be mere shadows.
 FAINT, CLEAR, DARKER = 2.0, 5.0, 0.25
 # If so large a share of a subject is at rest and looks like the background, the background may show the subject.
 AT_REST = 0.25
-GAPS = 9  # pixels: the breadth of gaps in a subject that look like the background
+GAPS = 9  # pixels: gaps in a subject that look like the background are filled if they are less broad
 BESIDE = 4  # pixels beside a subject's edge that may belong to it
 
 
@@ -46,7 +46,7 @@ class StillBackground:
         self._found: RecentValues[tuple[int, ...], np.ndarray] = RecentValues()
 
     def behind(self, frame: int, picture: np.ndarray) -> np.ndarray | None:
-        """Find the background of a frame. It depends on the footage and the frame alone.
+        """Find the background of a frame. Earlier calls have no influence on it.
 
         Args:
             frame: The frame.
@@ -92,7 +92,7 @@ def same_view(one: np.ndarray, other: np.ndarray) -> bool:
 def cleared(
     picture: np.ndarray, background: np.ndarray, old: np.ndarray, share: np.ndarray, places: carrying.Places
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """Remove from a picture what is no part of a subject: the background, and other things that move before it.
+    """Paint over what is no part of a subject: the background, and other things in front of it.
 
     Args:
         picture: The working picture of the next frame, (h, w, 3) uint8.
@@ -102,9 +102,9 @@ def cleared(
         places: For each pixel of `picture`, its place in that frame, (h, w, 2), x and y in pixels.
 
     Returns:
-        The picture, (h, w, 3) uint8, with one color where it shows the background or another thing.
-        The subject's share of each pixel, as motion has carried it here, (h, w), but 0 where the background is visible.
-        How sure it is that each pixel shows another thing that was before the background already, (h, w), 0 to 1.
+        The picture, (h, w, 3) uint8. One color hides the background, shadows on it, and other things.
+        The subject's share of each pixel, as motion has carried it here, (h, w), less where the background is visible.
+        How sure it is that each pixel shows another thing, which the known frame shows as well, (h, w), 0 to 1.
         None: AT_REST of the subject or more looks like the background and is at rest.
     """
     carried, colors, ground = flow.look(share, places), carrying.lab(picture), carrying.lab(background)
@@ -122,7 +122,7 @@ def cleared(
 
 
 def _in_front(colors: np.ndarray, ground: np.ndarray, darker: float = 1.0) -> np.ndarray:
-    """Return how sure it is that each pixel shows something before the background, (h, w), 0 to 1, without tiny holes.
+    """Return how sure it is that something is in front of the background, (h, w), 0 to 1. Tiny holes are filled.
 
     Args:
         colors: The picture's colors, (3, h, w), from carrying.lab.

@@ -51,7 +51,7 @@ BELIEVED, CLEARED = (0.5, 0.7, 0.7), (0.3, 0.7, 0.9)
 # Of the confidence: how sure the network is, how far it agrees, from none to full; the pixels of the working picture
 # below which a subject is small; and how much it may rise from frame to frame, as what was lost seldom comes back.
 UNSURE, UNLIKE, SMALL, RISES = (0.85, 0.95), (0.5, 0.8), 3000, 0.05
-CERTAIN = 0.8  # how certain the network has to be, or else it looks again
+CERTAIN = 0.8  # how certain a subject has to be, or else the network looks again
 # By how many pixels of the working picture a place moves rather with the ground than with the subject, and how far its
 # colors may differ from before, in units of CIE Lab.
 WITH, SAME = 0.25, 8.0
@@ -231,7 +231,7 @@ def _confidence(share: np.ndarray, sure: float, agrees: float = 1.0) -> float:
 
 
 def _certain(sure: float, agrees: float) -> float:
-    """Return how certain a subject is, 0 to 1, of which the network is so sure, and agrees so far with motion."""
+    """Return how certain a subject is, 0 to 1: how sure the network is, and how far it agrees with motion."""
     return _from(sure, UNSURE) * _from(agrees, UNLIKE)
 
 
@@ -304,7 +304,8 @@ def followed(
 ) -> tuple[Found, np.ndarray]:
     """Follow a subject to the next frame: carry it there by optical flow, and correct it by the network.
 
-    If the two do not agree and the camera stands still, the network looks once more, at a picture without the
+    If the network is unsure or disagrees with motion, and the camera stands still, it looks once more, at a picture
+    without the background. That answer counts if it is better, and at least half of the subject differs from the
     background.
 
     Args:
@@ -360,7 +361,7 @@ def _looked(
         passes: How sure it is that each pixel shows something else that passes, (h, w), 0 to 1.
 
     Returns:
-        The network's answer, (h, w), 0 to 1, with only the parts that `carried` covers; how far the two overlap, 0 to
+        The network's answer, (h, w), 0 to 1, with only the parts that `carried` shares; how far the two overlap, 0 to
         1; and how sure the network is, 0 to 1.
     """
     answer = network.within(picture, around(carried > INSIDE, ROOM), QUICK) * (1 - excluded)
