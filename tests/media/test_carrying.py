@@ -171,8 +171,7 @@ def test_mattes_are_kept(carried, footage, tmp_path):
     again = carried(0, 3, 6)
     assert all((again.read(frame) == first[frame]).all() for frame in range(8))
     assert footage.asked == []
-    changed = CarriedFile(footage, (*drawings(0, 3), (6, drawings(5)[0][1])), tmp_path / "mattes")
-    other = changed.open()
+    other = CarriedFile(footage, (*drawings(0, 3), (6, drawings(5)[0][1])), tmp_path / "mattes").open()
     assert all((other.read(frame) == first[frame]).all() for frame in range(4))
     assert footage.asked == []
     assert (other.read(5) != first[5]).any()
@@ -269,9 +268,7 @@ def test_a_folder_that_takes_nothing(footage, tmp_path, monkeypatch):
     np.testing.assert_array_equal([file.open().read(frame) for frame in (2, 4)], expected)
     assert file.open().has(2)
     carried_mattes._writable.cache_clear()  # private: it lasts as long as the program
-    monkeypatch.setattr(
-        tempfile, "TemporaryFile", mock.Mock(side_effect=PermissionError)
-    )  # as where it may be read alone
+    monkeypatch.setattr(tempfile, "TemporaryFile", mock.Mock(side_effect=PermissionError))  # it may be read alone
     assert good.has(2)
     carried_mattes._temporary.cache_clear()  # private: as before
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "file"))

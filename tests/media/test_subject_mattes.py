@@ -98,8 +98,7 @@ def test_processes_make_the_same_mattes_and_nothing_twice(opened, tmp_path):
         found = list(pool.map(lambda frame: opened(strokes).read(frame), (2, 1)))
     shutil.move(tmp_path / "mattes", tmp_path / "others")
     alone = opened(strokes)
-    for frame, matte in zip((2, 1), found, strict=True):
-        assert np.array_equal(alone.read(frame), matte)
+    assert all(np.array_equal(alone.read(frame), matte) for frame, matte in zip((2, 1), found, strict=True))
     more = opened(strokes | {4: [on_first(4)]})
     assert np.array_equal(more.read(1), alone.read(1))
     assert not more._source.asked  # private: nobody else is told which frames were read
@@ -137,7 +136,7 @@ def test_what_moves_with_the_ground_does_not_become_a_part():
     for frame in range(1, 5):
         figure, ground = figures(frame)[0], np.zeros((HEIGHT, WIDTH), bool)
         ground[70:120, 100 - 2 * frame : 140 - 2 * frame] = True
-        subject, _still = subject_mattes.followed(Greedy(), picture(frame - 1), picture(frame), subject)
+        subject, _still = subject_mattes.followed(Greedy(), picture(frame - 1), picture(frame), subject, pytest.fail)
         assert iou(subject.share, figure) > 0.85
         beside = cv2.dilate(figure.astype(np.uint8), np.ones((13, 13))) == 0
         assert subject.share[ground & beside].mean() < 0.1

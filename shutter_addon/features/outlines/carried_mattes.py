@@ -269,7 +269,7 @@ class CarriedMattes(SourceWrapper):
             yield each if share == 1 else replace(each, matte=np.rint(each.matte * share).astype(np.uint8))
 
     def _picture(self, frame: int) -> np.ndarray:
-        return flow.displayed(self._shots.read(frame), self.transfer, self.alpha)
+        return displayed(self._shots, frame)
 
     def _drawing(self, frame: int) -> carrying.Drawing:
         size = carrying.working_size(self.width, self.height)
@@ -298,6 +298,11 @@ class CarriedMattes(SourceWrapper):
         """Read the matte (H, W) uint8 in a file; None: the file is missing, damaged or not written by this program."""
         samples = derived.read(path, self._spec, CONFIDENCE)
         return None if samples is None else samples[..., 0]
+
+
+def displayed(source: FrameSource, frame: int) -> np.ndarray:
+    """Read a frame as it is displayed, (H, W, 3) uint8."""
+    return flow.displayed(source.read(frame), source.transfer, source.alpha)
 
 
 @cache

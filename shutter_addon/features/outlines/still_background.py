@@ -42,7 +42,7 @@ class StillBackground:
             count: How many frames the footage has.
         """
         self._picture, self._count = picture, count
-        self._samples: RecentValues[int, np.ndarray | None] = RecentValues()
+        self._samples: RecentValues[int, np.ndarray] = RecentValues()
         self._found: RecentValues[tuple[int, ...], np.ndarray] = RecentValues()
 
     def behind(self, frame: int, picture: np.ndarray) -> np.ndarray | None:
@@ -67,20 +67,16 @@ class StillBackground:
         return self._found.ask(tuple(alike), lambda: self._median(alike), 2) if len(alike) >= ENOUGH else None
 
     def _sample(self, frame: int) -> np.ndarray | None:
-        return self._samples.ask(frame, lambda: self._read(frame), 2 * SAMPLES)
-
-    def _read(self, frame: int) -> np.ndarray | None:
         stopping.check()
         try:
-            return self._picture(frame)
+            return self._samples.ask(frame, lambda: self._picture(frame), 2 * SAMPLES)
         except MediaError:  # a damaged frame far away is no fault of this one
             return None
 
     def _median(self, frames: list[int]) -> np.ndarray:
         stopping.check()
-        middle = len(frames) // 2
         samples = [it for each in frames if (it := self._sample(each)) is not None]
-        return np.partition(np.stack(samples, axis=-1), middle)[..., middle]
+        return np.partition(np.stack(samples, axis=-1), len(samples) // 2)[..., len(samples) // 2]
 
 
 def same_view(one: np.ndarray, other: np.ndarray) -> bool:

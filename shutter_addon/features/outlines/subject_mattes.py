@@ -30,7 +30,7 @@ from ...media.files import MODEL
 from ...media.image_writing import write_levels
 from ...media.opencv import cv2
 from . import carrying, still_background
-from .carried_mattes import CONFIDENCE, CarriedMattes, Drawings, nearest
+from .carried_mattes import CONFIDENCE, CarriedMattes, Drawings, displayed, nearest
 
 MEAN, DEVIATION = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)  # of the colors that such networks are trained with
 MULTIPLE, LEAST = 32, 5  # the network halves its picture five times: sides are multiples of that, five at least
@@ -45,9 +45,9 @@ LARGEST = 0.9  # share of the picture from which on a mask is no subject
 SOFT = 3  # pixels of the working picture by which soft edges go beyond the contour of a part
 WIDTH = 0.01  # of a stroke, in parts of the picture's height
 SHARED = 0.2  # share of a part that the carried matte has to cover
-# How far the network and the carried matte agree: below the first the network is not believed, above the second it is,
-# so far as the third says. What it finds in a picture without the background is believed sooner, and more.
-BELIEVED, CLEARED = (0.5, 0.7, 0.7), (0.3, 0.7, 0.9)
+# How far the network and the carried matte agree: below the first the network is not believed, above the second it is;
+# and how much of its answer counts then, in the picture as it is and without the background.
+BELIEVED, MOST, MOST_CLEARED = (0.5, 0.7), 0.7, 0.9
 # Of the confidence: how sure the network is, how far it agrees, from none to full; the pixels of the working picture
 # below which a subject is small; and how much it may rise from frame to frame, as what was lost seldom comes back.
 UNSURE, UNLIKE, SMALL, RISES = (0.85, 0.95), (0.5, 0.8), 3000, 0.05
@@ -305,8 +305,7 @@ def followed(
     """Follow a subject to the next frame: carry it there by optical flow, and correct it by the network.
 
     If the network is unsure or disagrees with motion, and the camera stands still, it looks once more, at a picture
-    without the background. That answer counts if it is better, and at least half of the subject differs from the
-    background.
+    without the background.
 
     Args:
         before: Working picture of the frame where the subject is known, (h, w, 3) uint8.
@@ -329,16 +328,18 @@ def followed(
     colors, old = carrying.lab(picture), carrying.lab(before)
     differ, rest = (carrying.apart(colors, each) for each in (old, np.stack([flow.look(p, grid + back) for p in old])))
     passes = _passing(grid + back, carried, rest)
-    believed, (answer, agrees, sure) = BELIEVED, _looked(network, picture, carried, excluded, passes)
-    doubted = _certain(sure, agrees) < CERTAIN and still_background.same_view(before, picture)
-    if doubted and (background := behind()) is not None:
+    answer, agrees, sure = _looked(network, picture, carried, excluded, passes)
+    trust = MOST * _from(agrees, BELIEVED)
+    looks_again = _certain(sure, agrees) < CERTAIN and still_background.same_view(before, picture)
+    if looks_again and (background := behind()) is not None:
         clear = still_background.cleared(picture, background, old, subject.share, grid + back)
-        if clear is not None and 2 * np.sum(clear[1] > INSIDE) > np.sum(carried > INSIDE):
-            passing = np.maximum(passes, clear[2])
-            again = _looked(network, *clear[:2], excluded, passing)
-            if again[1] * again[2] > agrees * sure:
-                believed, carried, passes, (answer, agrees, sure) = CLEARED, clear[1], passing, again
-    trust = believed[2] * _from(agrees, believed[:2])
+        if clear is not None and (clear[1] > INSIDE).any():
+            cleared, left, others = clear
+            passes_now = np.maximum(passes, others)
+            again, fits, surer = _looked(network, cleared, left, excluded, passes_now)
+            if (alike := _overlap(again, carried)) * surer > agrees * sure:
+                answer, agrees, sure, carried, passes = again, alike, surer, left, passes_now
+                trust = MOST_CLEARED * _from(fits, BELIEVED)
     # What passes does not stay a part either, if the network sees none there.
     share = carried + np.maximum(np.float32(trust), passes * (answer < carried)) * (answer - carried)
     moved = np.hypot(back[..., 0], back[..., 1])
@@ -372,8 +373,12 @@ def _looked(
     keep = np.bincount(parts.ravel(), weights=(carried > INSIDE).ravel()) >= SHARED * sizes
     keep[0] = False
     answer = _alone(answer, keep[parts])
-    agrees = float(np.minimum(answer, carried).sum() / max(np.maximum(answer, carried).sum(), 1e-6))
-    return answer, agrees, float(answer[answer > INSIDE].mean()) if (answer > INSIDE).any() else 0.0
+    return answer, _overlap(answer, carried), float(answer[answer > INSIDE].mean()) if (answer > INSIDE).any() else 0.0
+
+
+def _overlap(one: np.ndarray, other: np.ndarray) -> float:
+    """Return how far two areas (h, w), 0 to 1, overlap: their intersection over their union, 0 to 1."""
+    return float(np.minimum(one, other).sum() / max(np.maximum(one, other).sum(), 1e-6))
 
 
 def _passing(places: carrying.Places, carried: np.ndarray, rest: np.ndarray) -> np.ndarray:
@@ -658,11 +663,8 @@ class SubjectMattes(CarriedMattes):
     @cached_property
     def _background(self) -> still_background.StillBackground:
         shots, size = self._shots, carrying.working_size(self.width, self.height)
-
-        def picture(frame: int) -> np.ndarray:  # without `self`: a cycle would keep frames in memory
-            return flow.resized(flow.displayed(shots.read(frame), shots.transfer, shots.alpha), size)
-
-        return still_background.StillBackground(picture, self.count)
+        # Without `self`, as a cycle would keep frames in memory.
+        return still_background.StillBackground(lambda frame: flow.resized(displayed(shots, frame), size), self.count)
 
     @cached_property
     def _network(self) -> Network:
