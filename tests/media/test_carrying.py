@@ -268,7 +268,7 @@ def test_a_folder_that_takes_nothing(footage, tmp_path, monkeypatch):
     np.testing.assert_array_equal([file.open().read(frame) for frame in (2, 4)], expected)
     assert file.open().has(2)
     carried_mattes._writable.cache_clear()  # private: it lasts as long as the program
-    monkeypatch.setattr(tempfile, "TemporaryFile", mock.Mock(side_effect=PermissionError))  # it may be read alone
+    monkeypatch.setattr(tempfile, "TemporaryFile", mock.Mock(side_effect=PermissionError))  # it may only be read
     assert good.has(2)
     carried_mattes._temporary.cache_clear()  # private: as before
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "file"))

@@ -43,7 +43,7 @@ def test_a_subject_that_is_hardly_seen_is_followed(tmp_path):
 
 
 def shots(frame):
-    if frame == 30:  # of the rest, half of the samples lie behind a cut
+    if frame == 30:  # of 16 samples, 7 lie before the cut, and 8 after it
         raise MediaError("damaged")
     return picture(frame) if frame > 13 else 255 - picture(frame)
 

@@ -63,8 +63,10 @@ class StillBackground:
         sampled = range(start, min(start + 2 * half, self._count), step)
         if len(sampled) < ENOUGH:
             return None
-        alike = [each for each in sampled if (it := self._sample(each)) is not None and same_view(it, picture)]
-        return self._found.ask(tuple(alike), lambda: self._median(alike), 2) if len(alike) >= ENOUGH else None
+        samples = {each: it for each in sampled if (it := self._sample(each)) is not None and same_view(it, picture)}
+        if len(samples) < ENOUGH:
+            return None
+        return self._found.ask(tuple(samples), lambda: _median(list(samples.values())), 2)
 
     def _sample(self, frame: int) -> np.ndarray | None:
         stopping.check()
@@ -73,10 +75,10 @@ class StillBackground:
         except MediaError:  # a damaged frame far away is no fault of this one
             return None
 
-    def _median(self, frames: list[int]) -> np.ndarray:
-        stopping.check()
-        samples = [it for each in frames if (it := self._sample(each)) is not None]
-        return np.partition(np.stack(samples, axis=-1), len(samples) // 2)[..., len(samples) // 2]
+
+def _median(pictures: list[np.ndarray]) -> np.ndarray:
+    stopping.check()
+    return np.partition(np.stack(pictures, axis=-1), len(pictures) // 2)[..., len(pictures) // 2]
 
 
 def same_view(one: np.ndarray, other: np.ndarray) -> bool:

@@ -45,8 +45,8 @@ LARGEST = 0.9  # share of the picture from which on a mask is no subject
 SOFT = 3  # pixels of the working picture by which soft edges go beyond the contour of a part
 WIDTH = 0.01  # of a stroke, in parts of the picture's height
 SHARED = 0.2  # share of a part that the carried matte has to cover
-# How far the network and the carried matte agree: below the first the network is not believed, above the second it is;
-# and how much of its answer counts then, in the picture as it is and without the background.
+# How far the network has to agree with the carried matte: up to the first it is not believed, from the second on fully.
+# And how much of its answer counts then: in the picture as it is, and in one without the background.
 BELIEVED, MOST, MOST_CLEARED = (0.5, 0.7), 0.7, 0.9
 # Of the confidence: how sure the network is, how far it agrees, from none to full; the pixels of the working picture
 # below which a subject is small; and how much it may rise from frame to frame, as what was lost seldom comes back.
@@ -300,19 +300,19 @@ def followed(
     before: np.ndarray,
     picture: np.ndarray,
     subject: Found,
-    behind: Callable[[], np.ndarray | None] = lambda: None,
+    behind: Callable[[], np.ndarray | None],
 ) -> tuple[Found, np.ndarray]:
     """Follow a subject to the next frame: carry it there by optical flow, and correct it by the network.
 
-    If the network is unsure or disagrees with motion, and the camera stands still, it looks once more, at a picture
-    without the background.
+    If the network is unsure or disagrees with motion, and the camera stands still, the network looks once more, at a
+    picture without the background. That answer counts if the network is surer, or agrees more.
 
     Args:
         before: Working picture of the frame where the subject is known, (h, w, 3) uint8.
         picture: Working picture of the next frame (earlier in time if a chain goes backward), (h, w, 3) uint8.
         subject: The subject in the frame `before`.
-        behind: Returns the background of the next frame, (h, w, 3) uint8, or None (StillBackground.behind). It is asked
-            only if the network is not certain.
+        behind: Returns the background of the next frame, (h, w, 3) uint8, or None (StillBackground.behind). It is
+            called only before a second look.
 
     Returns:
         The subject in the next frame. Its confidence is 0 if nothing of it is left in the picture.
@@ -337,8 +337,10 @@ def followed(
             cleared, left, others = clear
             passes_now = np.maximum(passes, others)
             again, fits, surer = _looked(network, cleared, left, excluded, passes_now)
-            if (alike := _overlap(again, carried)) * surer > agrees * sure:
-                answer, agrees, sure, carried, passes = again, alike, surer, left, passes_now
+            # Against all of the subject, as what looks like the background may still belong to it.
+            overlap = _overlap(again, carried)
+            if fits > BELIEVED[0] and overlap * surer > agrees * sure:
+                answer, agrees, sure, carried, passes = again, overlap, surer, left, passes_now
                 trust = MOST_CLEARED * _from(fits, BELIEVED)
     # What passes does not stay a part either, if the network sees none there.
     share = carried + np.maximum(np.float32(trust), passes * (answer < carried)) * (answer - carried)
