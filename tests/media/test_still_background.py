@@ -76,10 +76,11 @@ def test_what_is_no_part_of_the_subject_is_cleared():
     before[10:30, 10:40] = now[10:30, 14:44] = 160, 40, 40
     before[40:55, 60:80] = now[40:55, 60:80] = 40, 40, 160
     now[30:34, 14:44] = 210  # a shadow
-    faded, carried, others = cleared(now, white, carrying.lab(before), share, places)
+    faded, carried, others = cleared(now, white, share, share, *map(carrying.lab, (now, before)), places)
     assert (faded[10:30, 14:44] == now[10:30, 14:44]).all()
     assert min(faded[40:55, 60:80].min(), faded[31:33, 16:42].min()) > 245
     assert (carried[20, 12], carried[20, 20], others[50, 70]) == (0, 1, 1)
     exact = SimpleNamespace(within=lambda *_: flow.look(share, places - np.float32((4, 0))))
     subject_mattes.followed(exact, before, now, Found(share, 0 * share, 1.0), pytest.fail)  # the network is certain
-    assert cleared(before, before, carrying.lab(before), share, places) is None  # it may have stood there all the time
+    colors = carrying.lab(before)
+    assert cleared(before, before, share, share, colors, colors, places) is None  # it may have stood there all the time

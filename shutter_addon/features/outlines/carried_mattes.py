@@ -269,7 +269,7 @@ class CarriedMattes(SourceWrapper):
             yield each if share == 1 else replace(each, matte=np.rint(each.matte * share).astype(np.uint8))
 
     def _picture(self, frame: int) -> np.ndarray:
-        return displayed(self._shots, frame)
+        return displayed_frame(self._shots, frame)
 
     def _drawing(self, frame: int) -> carrying.Drawing:
         size = carrying.working_size(self.width, self.height)
@@ -300,7 +300,7 @@ class CarriedMattes(SourceWrapper):
         return None if samples is None else samples[..., 0]
 
 
-def displayed(source: FrameSource, frame: int) -> np.ndarray:
+def displayed_frame(source: FrameSource, frame: int) -> np.ndarray:
     """Read a frame as it is displayed, (H, W, 3) uint8."""
     return flow.displayed(source.read(frame), source.transfer, source.alpha)
 

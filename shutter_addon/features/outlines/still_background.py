@@ -88,15 +88,23 @@ def same_view(one: np.ndarray, other: np.ndarray) -> bool:
 
 
 def cleared(
-    picture: np.ndarray, background: np.ndarray, old: np.ndarray, share: np.ndarray, places: carrying.Places
+    picture: np.ndarray,
+    background: np.ndarray,
+    share: np.ndarray,
+    carried: np.ndarray,
+    colors: np.ndarray,
+    old: np.ndarray,
+    places: carrying.Places,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
     """Paint over what is no part of a subject: the background, and other things in front of it.
 
     Args:
         picture: The working picture of the next frame, (h, w, 3) uint8.
         background: The background there, (h, w, 3) uint8.
-        old: The colors of the frame where the subject is known, (3, h, w), from carrying.lab.
-        share: How sure it is that each pixel of that frame belongs to the subject, (h, w), 0 to 1.
+        share: How sure it is that each pixel of the frame where the subject is known belongs to it, (h, w), 0 to 1.
+        carried: The same as motion has carried it to `picture`.
+        colors: The colors of `picture`, (3, h, w), from carrying.lab.
+        old: The colors of the frame where the subject is known.
         places: For each pixel of `picture`, its place in that frame, (h, w, 2), x and y in pixels.
 
     Returns:
@@ -105,7 +113,7 @@ def cleared(
         How sure it is that each pixel shows another thing, which the known frame shows as well, (h, w), 0 to 1.
         None: AT_REST of the subject or more looks like the background and is at rest.
     """
-    carried, colors, ground = flow.look(share, places), carrying.lab(picture), carrying.lab(background)
+    ground = carrying.lab(background)
     front = _in_front(colors, ground, DARKER)
     still = np.clip(1.5 - carrying.apart(colors, old) / np.float32(carrying.CHANGED), 0, 1)
     if float(((1 - front) * still)[carried > 0.5].mean()) >= AT_REST:

@@ -30,7 +30,7 @@ from ...media.files import MODEL
 from ...media.image_writing import write_levels
 from ...media.opencv import cv2
 from . import carrying, still_background
-from .carried_mattes import CONFIDENCE, CarriedMattes, Drawings, displayed, nearest
+from .carried_mattes import CONFIDENCE, CarriedMattes, Drawings, displayed_frame, nearest
 
 MEAN, DEVIATION = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)  # of the colors that such networks are trained with
 MULTIPLE, LEAST = 32, 5  # the network halves its picture five times: sides are multiples of that, five at least
@@ -320,19 +320,19 @@ def followed(
         carrying.QUIET, so that mattes do not flicker (carrying.stillness).
     """
     greys = [cv2.cvtColor(each, cv2.COLOR_RGB2GRAY) for each in (before, picture)]
-    grid = flow.grid(*subject.share.shape)
     back = flow.fine_vectors(greys[1], greys[0])
-    carried, excluded = (flow.look(each, grid + back) for each in (subject.share, subject.excluded))
+    places = flow.grid(*subject.share.shape) + back
+    carried, excluded = (flow.look(each, places) for each in (subject.share, subject.excluded))
     if not (carried > INSIDE).any():
         return Found(carried, excluded, 0.0), np.zeros_like(carried)
     colors, old = carrying.lab(picture), carrying.lab(before)
-    differ, rest = (carrying.apart(colors, each) for each in (old, np.stack([flow.look(p, grid + back) for p in old])))
-    passes = _passing(grid + back, carried, rest)
+    differ, rest = (carrying.apart(colors, each) for each in (old, np.stack([flow.look(p, places) for p in old])))
+    passes = _passing(places, carried, rest)
     answer, agrees, sure = _looked(network, picture, carried, excluded, passes)
     trust = MOST * _from(agrees, BELIEVED)
     looks_again = _certain(sure, agrees) < CERTAIN and still_background.same_view(before, picture)
     if looks_again and (background := behind()) is not None:
-        clear = still_background.cleared(picture, background, old, subject.share, grid + back)
+        clear = still_background.cleared(picture, background, subject.share, carried, colors, old, places)
         if clear is not None and (clear[1] > INSIDE).any():
             cleared, left, others = clear
             passes_now = np.maximum(passes, others)
@@ -666,7 +666,9 @@ class SubjectMattes(CarriedMattes):
     def _background(self) -> still_background.StillBackground:
         shots, size = self._shots, carrying.working_size(self.width, self.height)
         # Without `self`, as a cycle would keep frames in memory.
-        return still_background.StillBackground(lambda frame: flow.resized(displayed(shots, frame), size), self.count)
+        return still_background.StillBackground(
+            lambda frame: flow.resized(displayed_frame(shots, frame), size), self.count
+        )
 
     @cached_property
     def _network(self) -> Network:
