@@ -28,9 +28,10 @@ HALF_MAX = 65504  # the largest value of a half float, which infinite samples co
 # pictures it is less in proportion, but at least NOISE.
 UNLIKE, GREY, NOISE = 24.0, 90.0, 4.0
 SHARED = 0.5  # the share of vectors, in each direction, that have to be good
-# The farthest that a tile may move between two key moments, in 1 / UNIT of a pixel. Mixes of pictures no farther apart
-# look as good as pictures made by flow.
-FARTHEST = UNIT
+# The farthest that a tile may always move between two key moments, in 1 / UNIT of a pixel. Mixes of pictures no farther
+# apart look as good as pictures made by flow. Where the picture is smooth, a tile may move farther: until a mix differs
+# from the true picture by so many levels of 255.
+FARTHEST, VISIBLE = UNIT, 3.5
 _KEPT = 4  # cached key moments, and cached sets of vectors
 VERSION = 3  # raise it when `found` gives something else of the same pictures
 
@@ -69,7 +70,7 @@ class Between:
         if not np.array_equal(first, second):
             pictures = [luma(end, transfer, alpha) for end in self.ends]
             sides = [_carriers(each) for each in np.split((find or found)(*pictures), 2, axis=2)]
-            self._sides = sides if _meet(pictures, sides) else None
+            self._sides, self._farthest = sides if _meet(pictures, sides) else None, _farthest(pictures)
 
     def with_ends(self, first: np.ndarray, second: np.ndarray) -> Between:
         """Return a copy that makes moments between two other frames (H, W, 4) by the flow found here."""
@@ -100,7 +101,9 @@ class Between:
         if (sides := self._sides) is None:
             return self.ends[2 * number > steps]
         keys = 1 << (steps - 1).bit_length()
-        vectors, levels = self._paths.ask(keys, lambda: _of_keys(sides, self.ends[0].shape[:2], keys), _KEPT)
+        vectors, levels = self._paths.ask(
+            keys, lambda: _of_keys(sides, self._farthest, self.ends[0].shape[:2], keys), _KEPT
+        )
         return Moment(pair, self.ends, number, steps, vectors, levels, self)
 
     def rgba(self, moment: Moment) -> np.ndarray:
@@ -277,27 +280,52 @@ def _meet(pictures: list[np.ndarray], sides: list[_Carriers]) -> bool:
     return min(float((costs[1:] <= unlike).mean()) for _places, _vectors, costs in sides) >= SHARED
 
 
-def _of_keys(sides: list[_Carriers], shape: tuple[int, ...], keys: int) -> tuple[np.ndarray, np.ndarray]:
+def _farthest(pictures: list[np.ndarray]) -> np.ndarray:
+    """Return how far each tile (rows, columns) may move between two key moments, in 1 / UNIT of a pixel.
+
+    A mix of two pictures that are d pixels apart differs from the picture between them by at most d² / 8 times its
+    second derivative.
+
+    Args:
+        pictures: Both frames, grey (H, W) uint8.
+    """
+    bends = (np.abs(cv2.Laplacian(cv2.blur(each, (3, 3)), cv2.CV_16S)) for each in pictures)
+    bend = cv2.dilate(_tiles(np.maximum(*bends)).astype(np.float32), np.ones((3, 3), np.uint8))
+    return np.maximum(np.float32(FARTHEST), UNIT * np.sqrt(8 * VISIBLE / np.maximum(bend, 1)))
+
+
+def _tiles(values: np.ndarray, apart: int = 1) -> np.ndarray:
+    """Return the highest value in each tile of a picture, (rows, columns).
+
+    Args:
+        values: Values of every `apart`th pixel, (h, w), not negative.
+        apart: A divisor of TILE.
+    """
+    across, down = (length // apart for length in TILE)
+    height, width = values.shape
+    whole = np.pad(values, ((0, -height % down), (0, -width % across)))
+    return whole.reshape(-1, down, whole.shape[1]).max(axis=1).reshape(len(whole) // down, -1, across).max(axis=2)
+
+
+def _of_keys(
+    sides: list[_Carriers], farthest: np.ndarray, shape: tuple[int, ...], keys: int
+) -> tuple[np.ndarray, np.ndarray]:
     """Return Moment.vectors and Moment.levels for the moments between two frames.
 
     `levels` tells for each tile of the picture how many of the key moments it needs: the less it moves, the fewer.
 
     Args:
         sides: The vectors from the first frame to the second, and those from the second to the first.
+        farthest: How far each tile may move between two key moments, from `_farthest`.
         shape: The frames' (H, W).
         keys: Into how many equal parts the key moments divide the time between the frames, a power of two.
     """
     paths = np.stack([_paths(sides, shape, key / keys) for key in range(1, keys)])
     most, least = (each[..., :2].astype(np.float32) - ZERO for each in (paths.max(axis=0), paths.min(axis=0)))
-    farthest = np.maximum(most, -least).max(axis=2)
     # A pixel's path is interpolated between its cell and the next ones to the right and below.
-    farthest = cv2.dilate(farthest, np.ones((2, 2), np.uint8), anchor=(0, 0))
-    across, down = (length // STEP for length in TILE)
-    height, width = farthest.shape
-    cells = np.pad(farthest, ((0, -height % down), (0, -width % across)))
-    tiles = cells.reshape(-(-height // down), down, -1, across).max(axis=(1, 3))
-    steps = [FARTHEST << level for level in range(keys.bit_length() - 1)]
-    return paths, np.searchsorted(steps, tiles).astype(np.uint8)
+    moved = cv2.dilate(np.maximum(most, -least).max(axis=2), np.ones((2, 2), np.uint8), anchor=(0, 0))
+    steps = 1 << np.arange(keys.bit_length() - 1)
+    return paths, np.searchsorted(steps, _tiles(moved, STEP) / farthest).astype(np.uint8)
 
 
 def _paths(sides: list[_Carriers], shape: tuple[int, ...], t: float) -> np.ndarray:

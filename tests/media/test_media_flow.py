@@ -233,6 +233,13 @@ def test_what_is_kept_of_pictures_of_other_sizes_is_let_go():
     assert sum(trace.size for trace in arrays.traces) <= 32 * 39 * 2 * 4  # one place for each pixel
 
 
+@pytest.mark.parametrize(("contrast", "level"), [(1, 2), (0.2, 1)])
+def test_smooth_pictures_need_fewer_key_moments(contrast, level):
+    """All move by four pixels. A mix of frames less far apart shows the same where the picture bends little."""
+    pair = flow.Between(*(frame(0.5 + contrast * (noise(1)[:, 8 - x :][:, :128] - 0.5)) for x in (0, 4)))
+    assert np.median(pair.moment(0, 1, 8).levels) == level
+
+
 @pytest.mark.parametrize(("move", "dtype"), [((8, 0), np.uint8), ((-6, 3), np.uint16), ((5, -4), np.float32)])
 def test_vectors_say_where_all_goes(move, dtype):
     """For every fourth pixel, in 1/32 of one; and both frames surely show what stays in the picture."""
