@@ -50,7 +50,7 @@ SHARED = 0.2  # share of a part that the carried matte has to cover
 BELIEVED, MOST, MOST_CLEARED = (0.5, 0.7), 0.7, 0.9
 # Of the confidence: how sure the network is, how far it agrees, from none to full; the pixels of the working picture
 # below which a subject is small; and how much it may rise from frame to frame, as what was lost seldom comes back.
-UNSURE, UNLIKE, SMALL, RISES = (0.85, 0.95), (0.5, 0.8), 3000, 0.05
+UNSURE, UNLIKE, SMALL, RISES = (0.85, 0.95), (0.5, 0.8), 3600, 0.05
 CERTAIN = 0.8  # how certain a subject has to be, or else the network looks again
 # By how many pixels of the working picture a place moves rather with the ground than with the subject, and how far its
 # colors may differ from before, in units of CIE Lab.
@@ -416,7 +416,7 @@ def around(where: np.ndarray, room: float) -> Box:
     return box_around(area, reach) or tight
 
 
-VERSION = 3  # raise it when mattes of the same strokes change
+VERSION = 4  # raise it when mattes of the same strokes change
 EXCLUDED = 1  # the level of what strokes say that the subject is not
 MIDDLE = 3.0  # the part of a span between two keyframes in which both of their chains count is a third
 STEEPER = 3.0
