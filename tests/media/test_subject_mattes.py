@@ -112,6 +112,14 @@ def test_deleted_mattes_are_made_again(opened, tmp_path):
     assert np.array_equal(mattes.read(2), made)
 
 
+def test_damaged_mattes_end_nothing(opened, tmp_path):
+    made = opened({0: [on_first(0)]}).read(2)
+    one, two = sorted((tmp_path / "mattes").rglob("*.png"))[1:]
+    one.write_bytes(one.read_bytes()[:-100])
+    two.unlink()
+    assert np.array_equal(opened({0: [on_first(0)]}).read(2), made)
+
+
 def test_it_ends_at_a_cut(opened):
     mattes = opened({1: [on_first(1)]}, count=30, cut=3)
     assert iou(mattes.read(2), figures(2)[0]) > 0.9

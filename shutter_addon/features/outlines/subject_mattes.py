@@ -499,7 +499,7 @@ class SubjectMattes(CarriedMattes):
             around = [self._keys[end] for end in nearest(frame, self._showing) if end is not None]
             self._keys[frame] = derived.key({"strokes": self._keys[frame], "around": around})
         self._before: tuple[int, np.ndarray, np.ndarray] | None = None
-        self._written: tuple[Path, np.ndarray | None, float | None] | None = None
+        self._written: tuple[Path, np.ndarray] | None = None  # the last matte
 
     def read(self, index: int) -> np.ndarray:
         """Return a frame's matte, (height, width) float32, 0 to 1. Without any keyframes, it is empty.
@@ -570,24 +570,36 @@ class SubjectMattes(CarriedMattes):
     def _make(self, index: int, end: int) -> None:
         """Make and write a chain's mattes up to a frame, from its keyframe `end` or the last that a file keeps."""
         step = 1 if index > end else -1
-        start = index
-        while start != end and self._sure(start, end) is None:
+        start, known = index, self._known(index, end)
+        while known is None and start != end:
             start -= step
-        if start == end and self._sure(end, end) is None:
-            self._write(end, end, *self._first(end))
+            known = self._known(start, end)
+        known = known or self._write(end, end, *self._first(end))
         for frame in range(start, index, step):
             stopping.check()
-            self._write(frame + step, end, *self._next(frame, frame + step, end))
+            known = self._write(frame + step, end, *self._next(known, frame, frame + step, end))
         self._shots.release()
 
-    def _write(self, frame: int, end: int, matte: np.ndarray, excluded: np.ndarray, sure: float) -> None:
+    def _known(self, frame: int, end: int) -> tuple[np.ndarray, float] | None:
+        """Return a chain's matte (H, W) uint8 and its confidence; None: its file is missing or damaged."""
+        if (sure := self._sure(frame, end)) is None:
+            return None
+        path = self._path(frame, end, None)
+        matte = self._written[1] if self._written and self._written[0] == path else self._kept(path)
+        return None if matte is None else (matte, sure)
+
+    def _write(
+        self, frame: int, end: int, matte: np.ndarray, excluded: np.ndarray, sure: float
+    ) -> tuple[np.ndarray, float]:
+        """Write a chain's matte to a file, and return it (H, W) uint8 with its confidence as the file keeps them."""
         levels = flow.levels(matte)
         levels[levels == EXCLUDED] = EXCLUDED + 1
         if excluded.any():
             levels[(levels < EXCLUDED) & (_fitted(excluded, levels) > 0.5)] = EXCLUDED
         path = self._path(frame, end, None)
         write_levels(path, levels, f"{CONFIDENCE}{sure:.3f}")
-        self._written = path, levels, round(sure, 3)
+        self._written = path, levels
+        return levels, round(sure, 3)
 
     def _first(self, frame: int) -> tuple[np.ndarray, np.ndarray, float]:
         """Make the matte of a keyframe (with strokes or a drawing), at which a chain of mattes begins.
@@ -612,26 +624,25 @@ class SubjectMattes(CarriedMattes):
             what = without(self._carried_to(frame), small, on, off)
         return refined(picture, what.share), what.excluded, what.confidence
 
-    def _next(self, before: int, frame: int, end: int) -> tuple[np.ndarray, np.ndarray, float]:
-        """Make the matte of the next frame in a chain from the one of the frame before, which a file keeps.
+    def _next(
+        self, known: tuple[np.ndarray, float], before: int, frame: int, end: int
+    ) -> tuple[np.ndarray, np.ndarray, float]:
+        """Make the matte of the next frame in a chain from the one of the frame before.
 
         Args:
-            before: The frame whose matte is kept.
+            known: The matte of the frame before, (H, W) uint8, and its confidence.
+            before: The frame before.
             frame: The next frame of the chain, one later or earlier in time.
             end: The keyframe at which the chain begins.
 
         Returns:
             The matte, (H, W) float32, 0 to 1; what strokes exclude from it, carried along, (h, w) float32 in the
-            working picture, 0 to 1; and the confidence, 0 to 1. If a cut lies in between or earlier in the chain, or
-            the file is damaged, the matte is empty, nothing is excluded, and the confidence is GONE.
+            working picture, 0 to 1; and the confidence, 0 to 1. If a cut lies in between or earlier in the chain,
+            the matte is empty, nothing is excluded, and the confidence is GONE.
         """
-        path = self._path(before, end, None)
-        written = self._written
-        if written is None or written[0] != path:
-            written = path, self._kept(path), self._described(path)
-        _, matte, sure = written
+        matte, sure = known
         low, high = sorted((before, frame))
-        if matte is None or sure is None or sure == GONE or before not in self._shots.around(frame, low, high):
+        if sure == GONE or before not in self._shots.around(frame, low, high):
             return self._nothing(), self._nothing(), GONE
         (_, old), (picture, small) = (self._pictures(each) for each in (before, frame))
         size = small.shape[1::-1]
