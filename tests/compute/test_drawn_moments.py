@@ -4,16 +4,16 @@ import dataclasses
 
 import numpy as np
 import pytest
-from test_composition import LEVEL, Footage, composed, few_pieces
+from test_composition import LEVEL, SHAPES, Footage, composed, few_pieces
 from test_layered import with_layers
 
 from shutter_addon.compute import running_sums
+from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer
 from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import shutters
 from shutter_addon.core.model.frame_state import FrameState, Options
-from shutter_addon.core.model.scribbles import Shape
 from shutter_addon.features.smooth.smooth import SmoothSource
 from shutter_addon.media.cuts import ShotSource
 from shutter_addon.media.matte_values import MatteValues
@@ -118,8 +118,6 @@ def test_across_repeated_frames(device, steps):
 
 def test_filmed_frames_of_a_pair_are_sent_once(gpu_device, monkeypatch):
     """With the vectors of each moment, a sixteenth of a picture."""
-    from shutter_addon.compute.gpu import GPUCompositor
-
     sent, own = [], running_sums.Sums._filmed  # nothing else tells what is sent
 
     def noted(sums, moment, *given):
@@ -137,15 +135,12 @@ def test_filmed_frames_of_a_pair_are_sent_once(gpu_device, monkeypatch):
 
 def test_filmed_frames_are_not_read_again_to_guide(gpu_device):
     """Those that a pass adds with the moments before them are the diffusion's, too."""
-    from shutter_addon.compute.gpu import GPUCompositor
-
     filmed = film(np.random.default_rng(8))
     filmed.frames = np.stack([np.roll(filmed.frames[0], k, axis=1) for k in range(30)])
     filmed.count = 30
     source = ShotSource(SmoothSource(filmed, 4), 4)
-    line = Shape(1, "line", 0.1, (np.array([[0.1, 0.2], [0.7, 0.3]]),))
     options = Options(16, position="center", edge_aware=1.0, border=True, stop_at_cuts=False)
-    moment = smooth(FrameState(options, np.ones((2, 16)), (line,)))
+    moment = smooth(FrameState(options, np.ones((2, 16)), SHAPES[:1]))
     renderer = Renderer(GPUCompositor(gpu_device), source)
     for index in range(10, 18):
         renderer.picture(Request(4 * index, moment))

@@ -1,8 +1,5 @@
 """Exposures that are open while what they follow moves by a set length, or for as long as a timeline frame."""
 
-from dataclasses import replace
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -59,10 +56,8 @@ def accelerating(trail, position="center", bars=(1.0,) * WINDOW, edges="hold", f
     return made(len(bars), [shutter], [region], position=position, edges=edges, camera=keys)
 
 
-def followed(source, frame, direction=1):
+def followed(source, frame):
     effect = source.for_picture(SOURCE.width / SOURCE.height)
-    if direction < 0:
-        effect = replace(effect, time=SimpleNamespace(at=lambda other: (SOURCE.count - other + 1, True)))
     index, state, _direction = state_at(effect, SOURCE, frame)
     return state, index
 

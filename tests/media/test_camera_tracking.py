@@ -6,14 +6,13 @@ from functools import cache
 import cv2
 import numpy as np
 import pytest
-from test_tracking import ASSETS, HEIGHT, MIDDLE, PIXEL, SIZE, WIDTH, Film, ellipse, still, warped
+from test_tracking import HEIGHT, MIDDLE, PIXEL, SIZE, WIDTH, Film, ellipse, region, still, warped
 
 from shutter_addon.core.model import motions
-from shutter_addon.core.model.effect import STILL_CAMERA, Drawings, Moves, Region
-from shutter_addon.core.model.keyframes import Constant, Keys
+from shutter_addon.core.model.effect import STILL_CAMERA
+from shutter_addon.core.model.keyframes import Keys
 from shutter_addon.core.model.motions import Similarity
 from shutter_addon.features.tracking import camera_tracking, tracking
-from shutter_addon.media import open_source
 from shutter_addon.media.footage import Footage
 
 ENDS = np.array([0, WIDTH - 1, 1j * (HEIGHT - 1), WIDTH - 1 + 1j * (HEIGHT - 1)])
@@ -25,9 +24,7 @@ VELOCITY = 4  # of the subject across the picture, in pixels
 @cache
 def scenery():
     """A wide picture: a film's frame and its mirror image, 960 pixels."""
-    with open_source(ASSETS / "bigbuckbunny.mp4") as source:
-        picture = source.read(60)[..., :3]
-    half = cv2.resize(picture, SIZE, interpolation=cv2.INTER_AREA)
+    half = still("bigbuckbunny.mp4", 60)
     return np.concatenate([half, half[:, ::-1]], axis=1)
 
 
@@ -60,12 +57,8 @@ def lasso(count):
     turns = np.linspace(0, 6.1, 24)
     points = MIDDLE + RADII[0] * np.cos(turns) + 1j * RADII[1] * np.sin(turns)
     shape = np.stack([points.real / WIDTH, 1 - points.imag / HEIGHT], axis=1)
-    way = [(VELOCITY * (n - count / 2) / WIDTH, 0.0) for n in (0, count)]
-    drawings = Drawings("subject", (0.0,), ([shape],), ("linear",), WIDTH / HEIGHT)
-    location = Keys((0, count), tuple(way), ("linear", "linear"))
-    return Region(
-        moves=Moves(location), name="subject", shutter=0, kind="lasso", width=Constant(0.0), drawings=drawings
-    )
+    way = tuple((VELOCITY * (n - count / 2) / WIDTH, 0.0) for n in (0, count))
+    return region("lasso", drawn=[shape], location=Keys((0, count), way, ("linear", "linear")))
 
 
 def tracked(source, regions=(), start=0, camera=STILL_CAMERA, **options):

@@ -2,7 +2,6 @@
 
 from unittest import mock
 
-import av
 import footage
 import numpy as np
 import pytest
@@ -189,15 +188,12 @@ def test_frames_of_a_real_film_that_repeat(bunny):
 @pytest.mark.parametrize("crf", [18, 28])
 @pytest.mark.parametrize(("shown", "grain"), [(PULLDOWN, 0), (TWOS, 0), (PULLDOWN, 5), (range(15), 5)])
 def test_what_a_codec_makes_of_repeats(tmp_path, shown, grain, crf):
-    path = tmp_path / "film.mp4"
-    with av.open(str(path), "w") as movie:
-        stream = movie.add_stream("libx264", rate=30, options={"crf": str(crf)})
-        stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "yuv420p"
-        for number in shown:
-            noise = np.random.default_rng(number).normal(0, grain, (HEIGHT, WIDTH, 1))
-            made = np.clip(pan(number, 8)[..., :3] + noise, 0, 255).astype(np.uint8)
-            movie.mux(stream.encode(av.VideoFrame.from_ndarray(made, "rgb24")))
-        movie.mux(stream.encode())
+    pictures = []
+    for number in shown:
+        noise = np.random.default_rng(number).normal(0, grain, (HEIGHT, WIDTH, 1))
+        pictures.append(np.clip(pan(number, 8)[..., :3] + noise, 0, 255).astype(np.uint8))
+    options = {"size": (WIDTH, HEIGHT), "rate": 30, "options": {"crf": str(crf)}}
+    path = footage.make_movie(tmp_path / "film.mp4", "libx264", pictures=pictures, **options)
     with open_source(path) as movie:
         repeats = Repeats(movie)
         found = {k for k in range(movie.count) if repeats.gap(k)[0] < k}

@@ -111,9 +111,7 @@ def region(kind, *, drawn=None, location=(0.0, 0.0)):
 def followed(source, kind, start, frames=None, **options):
     track = tracking.RegionTrack(options.pop("region", None) or region(kind))
     found = list(track.follow(Footage(source, lambda frame: frame), start, frames or range(source.count), **options))
-    return {each.frame: each for each in found if not each.fault}, {
-        each.frame: each.fault for each in found if each.fault
-    }
+    return {f.frame: f for f in found if not f.fault}, {f.frame: f.fault for f in found if f.fault}
 
 
 def pixels(shape):
