@@ -27,13 +27,14 @@ HALF_MAX = 65504  # the largest value of a half float, which infinite samples co
 # The most levels of 255 by which the ends of a good vector differ, in pictures with a mean of GREY or more. In darker
 # pictures it is less in proportion, but at least NOISE.
 UNLIKE, GREY, NOISE = 24.0, 90.0, 4.0
+AROUND = 15  # pixels of the halved pictures, over which costs are averaged
 SHARED = 0.5  # the share of vectors, in each direction, that have to be good
 # The farthest that a tile may always move between two key moments, in 1 / UNIT of a pixel. Mixes of pictures no farther
 # apart look as good as pictures made by flow. Where the picture is smooth, a tile may move farther: until a mix differs
 # from the true picture by so many levels of 255.
-FARTHEST, VISIBLE = UNIT, 3.5
+FARTHEST, VISIBLE = UNIT, 6.0
 _KEPT = 4  # cached key moments, and cached sets of vectors
-VERSION = 3  # raise it when `found` gives something else of the same pictures
+VERSION = 4  # raise it when `found` gives something else of the same pictures
 
 
 class Between:
@@ -220,7 +221,7 @@ def found(first: np.ndarray, second: np.ndarray) -> np.ndarray:
         stopping.check()
         if min(height, width) >= SMALLEST:
             way = cv2.medianBlur(_dis(a, b, stride=4, smoothness=None), 5)  # which removes outliers
-        cost = cv2.blur(cv2.absdiff(a, look(b, grid(*a.shape) + way)).astype(np.float32), (3, 3))
+        cost = cv2.blur(cv2.absdiff(a, look(b, grid(*a.shape) + way)).astype(np.float32), (AROUND, AROUND))
         sides += [each[:: STEP // 2, :: STEP // 2] for each in (2 * way, cost)]
     values = np.dstack(sides)[: shape[0], : shape[1]]
     return values.clip(-HALF_MAX, HALF_MAX).astype(np.float16)
