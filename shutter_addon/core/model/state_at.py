@@ -34,7 +34,7 @@ from .mattes import Matte
 from .motions import Placement, Similarity
 
 
-class Moment(NamedTuple):
+class ShownState(NamedTuple):
     """What an effect needs for a picture at one timeline frame: its state, and the footage's frame shown there.
 
     Attributes:
@@ -48,7 +48,7 @@ class Moment(NamedTuple):
     direction: int
 
 
-def state_at(effect: Effect, clip: Clip, frame: float) -> Moment:
+def state_at(effect: Effect, clip: Clip, frame: float) -> ShownState:
     """Return an effect's state at a timeline frame, complete except for what needs the footage's pictures.
 
     In addition to Effect.at, its bars are those of moments (frames made between two filmed ones), exposures have the
@@ -70,7 +70,7 @@ def state_at(effect: Effect, clip: Clip, frame: float) -> Moment:
     has_trails = any(shutter.has_trail for shutter in effect.shutters)
     state = windows.slid(state, at.source_frame, at.direction, range(clip.count), whole=has_trails)
     state = followed(effect, state, clip, at)
-    return Moment(at.source_frame, _layered(effect, state, clip, at), at.direction)
+    return ShownState(at.source_frame, _layered(effect, state, clip, at), at.direction)
 
 
 def _in_moments(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameState:
