@@ -36,7 +36,7 @@ from .devices.passes import Pass, read_pass
 from .layer_frames import WeightedFrames
 from .request import Coefficients, Handle, Request
 from .running_sums import STORED_SUMS, Sums, WeightedSums
-from .stages import Stages
+from .stages import GPUStages
 from .window import BLOCK, Frames, PackedFrames, WholeFrames, Window, summable
 
 # LEVELS_OF of shaders/include/combine.glsl for a format of frames.
@@ -221,9 +221,9 @@ class GPUCompositor:
                 return Sums(*size)
         return Frames(*size)
 
-    def stages(self) -> Stages:
+    def stages(self) -> GPUStages:
         """Return what makes coefficients, and lays layers over one another, on this device."""
-        return Stages(self.device)
+        return GPUStages(self.device)
 
     def labels(self, values: np.ndarray) -> Texture:
         """Send labels (H, W) uint16 to the device, and return them as a texture r32ui, valid until the next call."""

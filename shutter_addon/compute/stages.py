@@ -23,7 +23,7 @@ BLOCK = 16
 LEAST = read_pass("layer", "LEAST")
 
 
-class Stages:
+class GPUStages:
     """Makes coefficients, and lays layers over one another, on a device (request.Stages)."""
 
     def __init__(self, device: Device) -> None:

@@ -294,13 +294,13 @@ class _Run:
                 time = time_of(frame) or 0  # a raw stream has none; it has no length, so MovieSource refuses it
                 if time < floor:
                     continue
-                self._settle(time)
+                self._note_lost(time)
                 if frame.is_corrupt:
                     self.fault = DAMAGED
                     self.lost.append(time)
                 else:
                     yield _Timed(time, frame)
-        self._settle(math.inf)
+        self._note_lost(math.inf)
 
     def _packets(self) -> Iterator[Packet | None]:
         """Yield the stream's packets, then None. Packets of all streams are read, to know where the file ends."""
@@ -325,7 +325,7 @@ class _Run:
             self.fault = f"{DAMAGED} ({reason(error)})"
             return []
 
-    def _settle(self, time: float) -> None:
+    def _note_lost(self, time: float) -> None:
         """Add frames that the decoder failed to give to `lost`, the list of lost time stamps.
 
         A frame is lost if the decoder was given its data, frames with a later time stamp come out already, and there
@@ -333,7 +333,7 @@ class _Run:
 
         Args:
             time: The time stamp of the frame that the decoder has just given; infinity at the end. Earlier ones are
-                settled.
+                checked.
         """
         while self._awaited and self._awaited[0] <= time:
             awaited = heapq.heappop(self._awaited)

@@ -30,8 +30,8 @@ def write_exr(path: Path, values: np.ndarray, names: Sequence[str], note: str = 
     """
     samples = values if values.dtype == np.float16 else np.asarray(values, np.float32)
     # The date is not the time of writing, so that equal samples make equal files.
-    told = {"compression": "zip", "DateTime": "1970:01:01 00:00:00", "Note": note}
-    _write(path, samples, {name: text for name, text in told.items() if text}, names)
+    attributes = {"compression": "zip", "DateTime": "1970:01:01 00:00:00", "Note": note}
+    _write(path, samples, {name: text for name, text in attributes.items() if text}, names)
 
 
 def write_grey(path: Path, values: np.ndarray) -> None:

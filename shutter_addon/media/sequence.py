@@ -119,8 +119,8 @@ class SequenceSource(FrameSource):
             size, dtype, first = window[2:], _dtype(spec), self.path.name
             if size != (self.width, self.height):
                 is_cropped = size != (spec.full_width, spec.full_height)
-                told = f"{size[0]}×{size[1]}{' (its data window)' if is_cropped else ''}"
-                raise MediaError(f"{path.name}: is {told}, but {first} is {self.width}×{self.height}")
+                size_text = f"{size[0]}×{size[1]}{' (its data window)' if is_cropped else ''}"
+                raise MediaError(f"{path.name}: is {size_text}, but {first} is {self.width}×{self.height}")
             if not self._channel and dtype != self.dtype:
                 raise MediaError(f"{path.name}: has {dtype} samples, but {first} has {self.dtype}")
             if not layer:

@@ -135,9 +135,9 @@ def test_the_trails_length_is_keyed(shown):
         open_for = np.count_nonzero(bars > 1e-9 * bars.sum())
         assert 1 < bars.sum() / bars.max() < WINDOW
         edit.frame_set(frame)
-        assert bar_edits.told(edit, effect, strip, bars) == f"Open for {open_for} of {WINDOW} frames here"
+        assert bar_edits.current_summary(edit, effect, strip, bars) == f"Open for {open_for} of {WINDOW} frames here"
     edit.frame_set(COUNT + 1)
-    assert "Open for" not in bar_edits.told(edit, effect, strip, bars), "nothing is shown there"
+    assert "Open for" not in bar_edits.current_summary(edit, effect, strip, bars), "nothing is shown there"
     effect.shutters[0].length = "FRAMES"
     assert np.array_equal(request(edit, effect, strip, 10).state.bars, np.ones((1, WINDOW)))
 

@@ -54,7 +54,10 @@ def test_eight_times_as_fast(edited):
     """Open for four source frames; the streak is as long as a camera's."""
     strip, effect = edited(time=speed((1, 1), (7, 49)))
     strip.id_data.frame_set(3)
-    assert bar_edits.told(strip.id_data, effect, strip, bar_edits.bars_now(effect, 0)) == "Open for 4 of 16 frames here"
+    assert (
+        bar_edits.current_summary(strip.id_data, effect, strip, bar_edits.bars_now(effect, 0))
+        == "Open for 4 of 16 frames here"
+    )
     for at in (2, 4):
         index = 8 * (at - 1)
         found = linear(strip, effect, at)

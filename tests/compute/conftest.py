@@ -77,9 +77,9 @@ def on_blender(blender_device):
 
 
 def _solving(device):
-    from shutter_addon.compute.stages import Stages
+    from shutter_addon.compute.stages import GPUStages
 
-    solver = Stages(device)
+    solver = GPUStages(device)
 
     def solve(labels, count, *guided, warm=False):
         with device.current():

@@ -75,8 +75,8 @@ def recipe(path: Path) -> Effect:
     """
     found = recipe_file.load(path)
     if found.lost is not None:
-        told = f"{path}: {found.lost}"  # not translated
-        render_job.say(told)
+        message = f"{path}: {found.lost}"  # not translated
+        render_job.say(message)
     return found
 
 

@@ -19,7 +19,7 @@ _PLAIN_STRIP = {"blend_alpha": 1.0, "color_saturation": 1.0, "scene_input": "CAM
 _PLAIN_SPACE = {"display_mode": "IMAGE", "display_channel": 0, "show_overexposed": 0}
 
 
-class Shown(NamedTuple):
+class PreviewedStrip(NamedTuple):
     """The effect strip that a preview shows at the playhead.
 
     Attributes:
@@ -87,7 +87,7 @@ def preview_region(area: Area) -> bpy.types.Region:
     return next(region for region in area.regions if region.type == "PREVIEW")
 
 
-def shown(context: Context, channel: int = 0) -> Shown | None:
+def shown(context: Context, channel: int = 0) -> PreviewedStrip | None:
     """Return the effect strip that the context's preview shows at the playhead.
 
     Args:
@@ -106,7 +106,7 @@ def shown(context: Context, channel: int = 0) -> Shown | None:
     drawn = [region for region in strips.used_regions(effect) if region.kind not in strips.MATTES]
     layers = [annotations.layer_of(effect, region) for region in drawn]
     hidden = tuple(layer is not None and layer.annotation_hide for layer in layers)
-    return Shown(scene=scene, effect=effect, strip=strip, strips_above=above, hides_strokes=hidden)
+    return PreviewedStrip(scene=scene, effect=effect, strip=strip, strips_above=above, hides_strokes=hidden)
 
 
 def look(context: Context, scene: Scene, effect: PropertyGroup, strip: Strip) -> Look:

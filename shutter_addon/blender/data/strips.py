@@ -139,7 +139,7 @@ def source_of(scene: Scene, effect: PropertyGroup, strip: Strip) -> Strip:
     return source
 
 
-class Shown(NamedTuple):
+class ShownEffect(NamedTuple):
     """An effect, an effect strip that shows it, and that strip's source (None: it is missing)."""
 
     effect: PropertyGroup
@@ -147,10 +147,10 @@ class Shown(NamedTuple):
     source: Strip | None
 
 
-def shown_effects(scene: Scene) -> list[Shown]:
+def shown_effects(scene: Scene) -> list[ShownEffect]:
     """Return a scene's effect strips, each with its effect and its source."""
     pairs = [(effect, strip) for strip in effect_strips(scene) if (effect := effect_of(scene, strip.scene))]
-    return [Shown(effect, strip, nearest_source(scene, effect, strip)) for effect, strip in pairs]
+    return [ShownEffect(effect, strip, nearest_source(scene, effect, strip)) for effect, strip in pairs]
 
 
 def with_sources(scene: Scene) -> list[Any]:

@@ -18,7 +18,7 @@ from ...media import color
 from ..data import data_format, fcurves, sole_effect, source_media
 from ..data.annotations import new_annotation
 from ..data.property_copy import for_a_while
-from ..data.strips import ENGINE, Shown, effect_of, nearest_source, origin, overlap, shown_effects
+from ..data.strips import ENGINE, ShownEffect, effect_of, nearest_source, origin, overlap, shown_effects
 
 _COLOR = "COLOR_06"
 # The look of a strip: each part's label, and the strip's properties and groups that it consists of.
@@ -85,7 +85,7 @@ def choose_source(effect: PropertyGroup, strip: Strip, source: Strip) -> None:
     connect(scene, [strip, source, *source.connections])
 
 
-def own_source(source: Strip, shown: list[Shown]) -> None:
+def own_source(source: Strip, shown: list[ShownEffect]) -> None:
     """Give a source strip a new, unique identity (a text), which copies and cut parts of it do not have.
 
     Effects find their source by its identity, so they would otherwise take the nearest of these strips.

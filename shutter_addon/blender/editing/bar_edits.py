@@ -38,7 +38,7 @@ def summary(weights: np.ndarray, combine: str = "AVERAGE") -> str:
     return words.format(angle=f"{angle:.0f}", frames=f"{angle / 360 * window:.3g}", window=window)
 
 
-def told(scene: Scene, effect: PropertyGroup, strip: Strip, weights: np.ndarray) -> str:
+def current_summary(scene: Scene, effect: PropertyGroup, strip: Strip, weights: np.ndarray) -> str:
     """Return a text for the user about the active shutter's bars: how long it is open.
 
     If the exposure's length varies (*Timeline*, or *Distance* of what it follows), the text says how many frames are

@@ -30,7 +30,7 @@ def strip_and_source(effect: PropertyGroup) -> list[Strip]:
     return next(([each.strip, each.source] for each in shown if each.effect == effect), [])
 
 
-class Shown(NamedTuple):
+class SourceMatch(NamedTuple):
     """What panels show about the source strip of an effect, and how the effect strip differs from it.
 
     Attributes:
@@ -48,12 +48,12 @@ class Shown(NamedTuple):
     has_effects: bool
 
 
-def shown(effect: PropertyGroup) -> Shown | None:
+def shown(effect: PropertyGroup) -> SourceMatch | None:
     """Return what panels show about an effect's source, cached until something changes; None: a strip is missing."""
     return revision.until_change("source", effect.scene.session_uid, lambda: _compare(effect))
 
 
-def _compare(effect: PropertyGroup) -> Shown | None:
+def _compare(effect: PropertyGroup) -> SourceMatch | None:
     if not (pair := strip_and_source(effect)):
         return None
     strip, source = pair
@@ -64,7 +64,7 @@ def _compare(effect: PropertyGroup) -> Shown | None:
     # The engine reads the file, without modifiers.
     modifiers = Counter(modifier.type for modifier in source.modifiers if not modifier.mute)
     lacks_modifiers = bool(modifiers - Counter(modifier.type for modifier in strip.modifiers))
-    return Shown(source.name, words, lacks_modifiers, bool(effects_on(effect.id_data, source)))
+    return SourceMatch(source.name, words, lacks_modifiers, bool(effects_on(effect.id_data, source)))
 
 
 def match(effect: PropertyGroup) -> Strip | None:

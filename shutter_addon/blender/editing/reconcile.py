@@ -53,7 +53,7 @@ def update(updated: Scene | None = None) -> None:
         invalidation.invalidate_changed(scene)
 
 
-def tidy(updated: Scene | None = None) -> list[strips.Shown]:
+def tidy(updated: Scene | None = None) -> list[strips.ShownEffect]:
     """Adapt effects to their strips, as `update` does, but read no footage (follow_sources) and drop no cached frames.
 
     Args:
@@ -81,7 +81,7 @@ def tidy(updated: Scene | None = None) -> list[strips.Shown]:
     return shown
 
 
-def gather() -> list[strips.Shown]:
+def gather() -> list[strips.ShownEffect]:
     """Return all effects that strips show in local scenes (not linked from other files), each with strip and source."""
     return [each for scene in strips.local_scenes() for each in strips.shown_effects(scene)]
 
@@ -273,7 +273,7 @@ def _effect_strips() -> list[Strip]:
     return [strip for scene in strips.local_scenes() for strip in strips.effect_strips(scene)]
 
 
-def _identify(shown: list[strips.Shown]) -> None:
+def _identify(shown: list[strips.ShownEffect]) -> None:
     """Give each effect scene a unique identity, which its strip and effect get, too, and an annotation of its own."""
     identities, drawn = set(), set()
     for scene in _oldest_first(_effect_scenes()):
@@ -293,7 +293,7 @@ def _identify(shown: list[strips.Shown]) -> None:
         _give(effect, "identity", effect.scene.virtual_shutter.identity)
 
 
-def _follow_strips(shown: list[strips.Shown]) -> None:
+def _follow_strips(shown: list[strips.ShownEffect]) -> None:
     """Move keyframes and drawings of effects along with strips that were moved in time."""
     for effect, strip, _source in shown:
         start = strips.origin(strip)
@@ -328,7 +328,7 @@ def _move_drawings(effect: PropertyGroup, start: float) -> None:
         annotation.virtual_shutter_start = start
 
 
-def _part_sources(shown: list[strips.Shown]) -> None:
+def _part_sources(shown: list[strips.ShownEffect]) -> None:
     """Give source strips new identities where effects use different strips with the same identity.
 
     Copies and cut parts of a strip share its identity. The first strip that is found keeps it. Effects of the others
@@ -340,7 +340,7 @@ def _part_sources(shown: list[strips.Shown]) -> None:
             add_effect.own_source(source, shown)
 
 
-def _unmute_sources(scenes: list[Scene], shown: list[strips.Shown]) -> None:
+def _unmute_sources(scenes: list[Scene], shown: list[strips.ShownEffect]) -> None:
     """Unmute sources that were muted for an effect, which no effect strip uses and no baked strip covers any more."""
     sources = {each.source for each in shown}
     for strip in [strip for scene in scenes for strip in strips.all_strips(scene) if strip.virtual_shutter_muted]:
@@ -357,7 +357,7 @@ def _is_baked_over(source: Strip) -> bool:
     return any(s.virtual_shutter_bake.identity and strips.overlap(s, source) for s in baked)
 
 
-def _follow_names(shown: list[strips.Shown]) -> None:
+def _follow_names(shown: list[strips.ShownEffect]) -> None:
     """Enter the new name of a renamed annotation layer in the regions that use it, then store the layers' names.
 
     An effect stores the names of its annotation's layers as of the last call. A layer counts as renamed if there are as
@@ -415,7 +415,7 @@ def _remove_left() -> None:
         made.virtual_shutter_made = USERS
 
 
-def follow_sources(shown: list[strips.Shown]) -> None:
+def follow_sources(shown: list[strips.ShownEffect]) -> None:
     """Give effect scenes the edit's frame rate and stereo setting, and the size of the source's footage.
 
     If the size changes, strokes stay in place on the picture. Also set a factor in the colors of an effect strip, so

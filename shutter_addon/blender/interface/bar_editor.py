@@ -132,7 +132,7 @@ class SHUTTER_GT_bars(Dragged, Gizmo):
     def show(self, context: Context, seen: tuple) -> None:
         scene, effect, strip, bars, states = seen
         shutter = selection.active_shutter(effect)
-        words, place = bar_edits.told(scene, effect, strip, bars), _layout(context, bars)
+        words, place = bar_edits.current_summary(scene, effect, strip, bars), _layout(context, bars)
         _draw(place, shutter, bars, states)
         _draw_header(place, shutter, effect.active_shutter, f"{shutter.name}   {words}")
 

@@ -20,7 +20,7 @@ from ...compute.devices.passes import read_pass
 from ...core.model.scribbles import mapped
 from ...core.pixels import patterns
 from ..data import annotations
-from ..data.preview_areas import Shown
+from ..data.preview_areas import PreviewedStrip
 from ..devices import blender_gpu
 from .gizmo_groups import view
 
@@ -185,7 +185,7 @@ class Quad:
 
     shaders: dict[str, GPUShader] = {}  # by pass, because compiling takes long
 
-    def __init__(self, region: Region, shown: Shown) -> None:
+    def __init__(self, region: Region, shown: PreviewedStrip) -> None:
         self.view = view(shown.effect, shown.strip, region)
         strip, render = shown.strip, shown.scene.render
         half = np.array([render.resolution_x, render.resolution_y]) / 2

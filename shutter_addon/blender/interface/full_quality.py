@@ -44,7 +44,7 @@ class SHUTTER_OT_full_quality(Named, Operator):
         return {"FINISHED"}
 
 
-def _shown(context: Context) -> tuple[Window, Area, preview_areas.Shown] | None:
+def _shown(context: Context) -> tuple[Window, Area, preview_areas.PreviewedStrip] | None:
     """Return a preview that shows an effect: window, area and the shown effect strip; None: no preview does.
 
     Prefer the area of the context.

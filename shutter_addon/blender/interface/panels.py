@@ -163,7 +163,7 @@ def _draw_bars(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Str
         sentence(layout, str(error), "ERROR")
         return
     is_open = bool(bars.any())
-    words = bar_edits.told(scene, effect, strip, bars)
+    words = bar_edits.current_summary(scene, effect, strip, bars)
     sentence(layout, words, "NONE" if is_open else "ERROR", is_quiet=is_open)
 
 

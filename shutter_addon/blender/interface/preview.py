@@ -22,13 +22,13 @@ from ...core.model.effect import SubjectRegion
 from ...core.model.fields import Labelled
 from ...core.model.frame_state import FrameState
 from ..data import annotations, preview_areas, selection
-from ..data.preview_areas import Shown
+from ..data.preview_areas import PreviewedStrip
 from ..data.properties import with_fields
 from ..data.snapshot import Snapshot
 from ..devices import blender_gpu, main_thread
 from ..editing import shown_annotations
 from ..rendering import effect_source, invalidation, pictures, previews, render_job
-from ..rendering.previews import Decision, Drawing
+from ..rendering.previews import Decision, PreviewDrawing
 from . import drawing, sharp_frame
 from .drawing import Quad
 
@@ -128,7 +128,7 @@ def _draw() -> None:
         draw_notes(context.region, notes)
 
 
-def _show(context: Context, shown: Shown, decision: Decision | None, say: Say) -> None:
+def _show(context: Context, shown: PreviewedStrip, decision: Decision | None, say: Say) -> None:
     """Draw what the live preview shows of an effect: the picture or view, strokes and notes.
 
     If making the picture takes long, draw the strokes and the note "Composing…", and go on in the next redraw. An error
@@ -161,7 +161,7 @@ def _show(context: Context, shown: Shown, decision: Decision | None, say: Say) -
         say(rpt_("Shutter: {fault}").format(fault=error))
 
 
-def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, say: Say) -> None:
+def _show_picture(context: Context, quad: Quad, shown: PreviewedStrip, wanted: PreviewDrawing, say: Say) -> None:
     settings, renderer, request = context.window_manager.virtual_shutter, wanted.renderer, wanted.request
     is_still = not context.screen.is_animation_playing
     if context.space_data.show_overlays:
@@ -195,7 +195,7 @@ def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, s
         features.call("note_streaks", shown.effect, decision.snapshot, renderer, decision.request, say)
 
 
-def _tell_detail(wanted: Drawing, size: tuple[int, int], say: Say) -> None:
+def _tell_detail(wanted: PreviewDrawing, size: tuple[int, int], say: Say) -> None:
     """Add a note about how a preview is worse than a render: smaller, from a proxy, or with draft edges.
 
     With *Full Quality*, the note says that the picture is as it will be rendered.
@@ -220,7 +220,7 @@ def _tell_detail(wanted: Drawing, size: tuple[int, int], say: Say) -> None:
         say(rpt_("Preview: {what}").format(what=", ".join(less)))
 
 
-def _show_sharp(context: Context, shown: Shown | None) -> None:
+def _show_sharp(context: Context, shown: PreviewedStrip | None) -> None:
     """Draw a note and the strokes over the source frame that is shown for drawing (sharp_frame)."""
     with drawing.pixel_space(context.region), suppress(*effect_source.FAULTS):
         draw_notes(context.region, [rpt_("Sharp frame to draw on: the result appears after the stroke")])
@@ -230,7 +230,7 @@ def _show_sharp(context: Context, shown: Shown | None) -> None:
             _show_strokes(context, quad, shown, snapshot)
 
 
-def _show_strokes(context: Context, quad: Quad, shown: Shown, snapshot: Snapshot) -> None:
+def _show_strokes(context: Context, quad: Quad, shown: PreviewedStrip, snapshot: Snapshot) -> None:
     """Draw the strokes and outlines at the current frame (Effect.drawn_at), unless the preview hides overlays.
 
     Regions whose annotation layer is hidden are left out, except for a subject's *Not This* strokes.
@@ -250,7 +250,7 @@ def _show_strokes(context: Context, quad: Quad, shown: Shown, snapshot: Snapshot
             drawing.lines(quad.view.on_region(points), (*annotations.NOT_THIS, 1.0), width=2)
 
 
-def _show_source(quad: Quad, shown: Shown, renderer: Renderer, request: Request, right: float) -> None:
+def _show_source(quad: Quad, shown: PreviewedStrip, renderer: Renderer, request: Request, right: float) -> None:
     """Draw the frame of the footage shown now, without the effect, for views that show the source.
 
     Args:

@@ -19,7 +19,7 @@ from ...core.frames.frame_source import FrameSource
 from ...core.stopping import Slice, Slices, never
 from ...media.reduced import DIVISORS
 from ..data import annotations, preview_areas, selection, strips
-from ..data.preview_areas import Look, Shown
+from ..data.preview_areas import Look, PreviewedStrip
 from ..data.snapshot import Snapshot
 from . import effect_source, invalidation, render_job, sessions
 
@@ -77,7 +77,7 @@ class Decision:
 
 
 @dataclass(frozen=True)
-class Drawing:
+class PreviewDrawing:
     """What the extension's draw handler draws over a preview.
 
     Attributes:
@@ -172,7 +172,7 @@ def take_decision() -> Decision | None:
     return decision
 
 
-def for_drawing(context: Context, shown: Shown, decision: Decision | None) -> Drawing:
+def for_drawing(context: Context, shown: PreviewedStrip, decision: Decision | None) -> PreviewDrawing:
     """Return what the extension's draw handler draws over a preview.
 
     Args:
@@ -195,10 +195,10 @@ def for_drawing(context: Context, shown: Shown, decision: Decision | None) -> Dr
     draws_result = has_result and left < 1 and (decision.is_drawn or not _is_rendered(shown))
     renderer = sessions.of_drawing().renderer(request)
     decision = replace(decision, stopped=never if is_read(context) else _time_up(context, decision.request))
-    return Drawing(decision=decision, request=request, renderer=renderer, left=left, draws_result=draws_result)
+    return PreviewDrawing(decision=decision, request=request, renderer=renderer, left=left, draws_result=draws_result)
 
 
-def request_of(context: Context, shown: Shown) -> Request:
+def request_of(context: Context, shown: PreviewedStrip) -> Request:
     """Return what to compose for the picture that our draw handler draws of an effect strip at the current frame.
 
     Raises:
@@ -207,22 +207,22 @@ def request_of(context: Context, shown: Shown) -> Request:
     return _drafted(context, shown, _decide(context, shown, _look(context, shown), _snapshot(shown)).request)
 
 
-def _look(context: Context, shown: Shown) -> Look:
+def _look(context: Context, shown: PreviewedStrip) -> Look:
     return preview_areas.look(context, shown.scene, shown.effect, shown.strip)
 
 
-def _decide(context: Context, shown: Shown, look: Look, snapshot: Snapshot) -> Decision:
+def _decide(context: Context, shown: PreviewedStrip, look: Look, snapshot: Snapshot) -> Decision:
     request, is_plain = _requested(context, shown, snapshot, look)
     source = sessions.of_drawing().renderer(request).source
     is_drawn = _is_drawn(context, shown, look, source, is_less=is_plain or is_going(context))
     return Decision(snapshot, shown.scene.frame_current, request, is_drawn, is_plain)
 
 
-def _snapshot(shown: Shown) -> Snapshot:
+def _snapshot(shown: PreviewedStrip) -> Snapshot:
     return invalidation.current(shown.scene, shown.effect, shown.strip, shown.scene.frame_current)
 
 
-def _requested(context: Context, shown: Shown, snapshot: Snapshot, look: Look) -> tuple[Request, bool]:
+def _requested(context: Context, shown: PreviewedStrip, snapshot: Snapshot, look: Look) -> tuple[Request, bool]:
     """Return _best's request for the shown frame, in full detail while *Full Quality* is on, else in that of previews.
 
     *Full Quality* ends here if another effect or frame is shown, the effect has changed, the film plays, or the user
@@ -274,7 +274,7 @@ def _detail(context: Context, look: Look) -> effect_source.Detail:
     return effect_source.Detail(divisor, look.proxy, smooth=is_smooth)
 
 
-def _is_drawn(context: Context, shown: Shown, look: Look, source: FrameSource, *, is_less: bool) -> bool:
+def _is_drawn(context: Context, shown: PreviewedStrip, look: Look, source: FrameSource, *, is_less: bool) -> bool:
     """Tell whether our draw handler shows the picture instead of Blender, which is allowed where both look the same.
 
     A still result of full size is left to Blender, because what the handler draws has only 8 bits.
@@ -290,7 +290,7 @@ def _is_drawn(context: Context, shown: Shown, look: Look, source: FrameSource, *
     return is_wanted and not shown.strips_above and source.alpha == "opaque" and look.is_plain and not pen_is_down()
 
 
-def _drafted(context: Context, shown: Shown, request: Request) -> Request:
+def _drafted(context: Context, shown: PreviewedStrip, request: Request) -> Request:
     is_result = context.window_manager.virtual_shutter.view in RESULTS and _is_rendered(shown)
     if looking.whole is not None or (is_result and not is_going(context)):
         return request
@@ -311,7 +311,7 @@ def draft(request: Request, source: FrameSource) -> Request:
     return replace(request, state=request.state.in_blocks(block))
 
 
-def _is_rendered(shown: Shown) -> bool:
+def _is_rendered(shown: PreviewedStrip) -> bool:
     """Tell whether the sequencer's previews show Scene strips rendered, by our engine."""
     return shown.scene.render.sequencer_gl_preview == "RENDERED"
 

@@ -19,7 +19,7 @@ from ..frames.retiming import StripTiming
 from .keyframes import Channel
 
 
-class Shown(NamedTuple):
+class ShownFrame(NamedTuple):
     """Which frame of the footage is shown at a timeline frame.
 
     Attributes:
@@ -64,12 +64,12 @@ class Clip:
         fps = None if self.fps is None else self.fps * factor
         return replace(self, count=(self.count - 1) * factor + 1, step=factor, fps=fps)
 
-    def shown(self, frame: float) -> Shown:
+    def shown(self, frame: float) -> ShownFrame:
         """Return which frame of the footage a timeline frame shows, and in which direction the footage plays there."""
         if isinstance(self.timing, StripTiming):
-            return Shown(frame, self._shown_by(self.timing, frame), -1 if self.timing.use_reverse_frames else 1)
+            return ShownFrame(frame, self._shown_by(self.timing, frame), -1 if self.timing.use_reverse_frames else 1)
         filmed, backward = self.timing.at(frame) if self.timing else (frame, False)
-        return Shown(frame, nearest(filmed - 1, self.step, self.count), -1 if backward else 1)
+        return ShownFrame(frame, nearest(filmed - 1, self.step, self.count), -1 if backward else 1)
 
     def position(self, frame: float) -> float:
         """Return the place in the footage that a timeline frame shows, as a frame number with a fraction.

@@ -137,7 +137,7 @@ class AnyRegion(Subject):
     name: str = Labelled("Name", "Name of the region").fixed(default="Region", absent="", most=limits.MAX_NAME)
     shutter: int
     opacity: Channel = Labelled("Opacity", "Influence of the region: 0 is like no region").number(
-        default=1.0, subtype="FACTOR", told=False
+        default=1.0, subtype="FACTOR", always_written=False
     )
     layer: bool = Labelled(
         "Layer", "Expose the region separately, in front of everything else, so that it leaves no ghost"
@@ -324,7 +324,7 @@ class Camera(Subject):
 
     influence: Channel = Labelled(
         "Influence", "Length of exposures that follow the camera: 0 exposes only the shown frame"
-    ).number(default=1.0, subtype="FACTOR", recipe="camera_influence", told=False)
+    ).number(default=1.0, subtype="FACTOR", recipe="camera_influence", always_written=False)
 
 
 STILL_CAMERA = Camera(Moves())
@@ -357,11 +357,11 @@ class Shutter:
     bars: Bars
     follow: Subject | None = None
     follow_motion: motions.Motion = Labelled("Motion", "Part of the motion that the exposure follows").choice(
-        MOTIONS, default="scale", context=CONTEXT, told=False
+        MOTIONS, default="scale", context=CONTEXT, always_written=False
     )
     follow_smooth: int = Labelled(
         "Smoothness", "Frames on each side over which the motion is averaged, like that of a heavy camera"
-    ).fixed(default=0, most=limits.MAX_SMOOTH, soft_most=24, told=False)
+    ).fixed(default=0, most=limits.MAX_SMOOTH, soft_most=24, always_written=False)
     length: Literal["frames", "timeline", "motion"] = Labelled(
         "Exposure Length", "What sets the length of the exposure"
     ).choice(LENGTHS, default="frames", context=CONTEXT, recipe="")
@@ -369,11 +369,11 @@ class Shutter:
         "Distance", "Distance of the motion while the shutter is open, as a fraction of the picture's height"
     ).number(default=0.1, most=limits.MAX_DISTANCE, soft_most=1.0, precision=3, recipe="")
     combine: Mode = Labelled("Combine", "How exposed frames are combined").choice(
-        COMBINES, default="average", told=False
+        COMBINES, default="average", always_written=False
     )
     by_luminance: bool = Labelled(
         "By Luminance", "Choose one frame per pixel by its luminance, not one per color channel"
-    ).switch(told=False)
+    ).switch(always_written=False)
     use_threshold: bool = Labelled(
         "Use Threshold", "Let only light above the threshold leave trails, or with Darkest, below it"
     ).switch(recipe="")
@@ -381,7 +381,7 @@ class Shutter:
         "Threshold", "Luminance in linear light from which light leaves a trail; white is 1"
     ).number(default=0.5, most=limits.MAX_THRESHOLD, soft_most=1.0, precision=3, recipe="")
     softness: Channel = Labelled("Softness", "Range of luminance around the threshold in which trails fade in").number(
-        default=0.1, absent=0.0, most=limits.MAX_THRESHOLD, soft_most=1.0, precision=3, told=False
+        default=0.1, absent=0.0, most=limits.MAX_THRESHOLD, soft_most=1.0, precision=3, always_written=False
     )
 
     @property

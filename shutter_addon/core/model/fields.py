@@ -40,7 +40,7 @@ class Field:
         blender: The name of the property in Blender.
         recipe: The name of the field in recipes. "": the generic code leaves it out, and other code may write it.
         shown: Whether the generic code of the shutter's panel shows it.
-        told: Whether recipes are written with the field even if its value equals `absent`.
+        always_written: Whether recipes are written with the field even if its value equals `absent`.
         subtype, precision: As for Blender's property: how the value is shown, and its number of decimals.
         context: The translation context of the label.
     """
@@ -58,7 +58,7 @@ class Field:
     keyed: bool = False
     is_channel: bool = False
     keyed_in_recipe: bool = False
-    told: bool = True
+    always_written: bool = True
     shown: bool = False
     subtype: str = "NONE"
     precision: int = 2

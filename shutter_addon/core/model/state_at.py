@@ -27,7 +27,7 @@ from typing import NamedTuple
 import numpy as np
 
 from . import motions, scribbles, shutters, windows
-from .clip import Clip, Shown
+from .clip import Clip, ShownFrame
 from .effect import Camera, Effect, MatteRegion, Region, Subject
 from .frame_state import Following, FrameState, Layers, Options
 from .mattes import Matte
@@ -73,7 +73,7 @@ def state_at(effect: Effect, clip: Clip, frame: float) -> ShownState:
     return ShownState(at.source_frame, _layered(effect, state, clip, at), at.direction)
 
 
-def _in_moments(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameState:
+def _in_moments(effect: Effect, state: FrameState, clip: Clip, at: ShownFrame) -> FrameState:
     """Return the state with its bars and window in moments: filmed frames, and those that are made between them.
 
     Options.window then counts moments; Options.step and `backward` are set. Bars that only give an exposure's shape are
@@ -94,7 +94,7 @@ def _in_moments(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> Fra
     return replace(state, bars=np.stack(bars), options=options)
 
 
-def _layered(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameState:
+def _layered(effect: Effect, state: FrameState, clip: Clip, at: ShownFrame) -> FrameState:
     """Return the state with the effect's layers, and their mattes in all source frames that the picture may use.
 
     These are the frames of the window, and those around it that are searched for the background (Options.plate_reach).
@@ -188,7 +188,7 @@ _SMALLEST = 1e-6
 Places = Callable[[float], tuple[Placement, np.ndarray | None]]
 
 
-def followed(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameState:
+def followed(effect: Effect, state: FrameState, clip: Clip, at: ShownFrame) -> FrameState:
     """Return the state with the motions that shutters follow, and with exposures whose length depends on these motions.
 
     The state is unchanged if no shutter follows anything.
@@ -222,7 +222,7 @@ def followed(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameS
     return replace(state, bars=bars, following=following.of(slice(None)))
 
 
-def _with_trails(effect: Effect, state: FrameState, following: Following, clip: Clip, at: Shown) -> np.ndarray:
+def _with_trails(effect: Effect, state: FrameState, following: Following, clip: Clip, at: ShownFrame) -> np.ndarray:
     """Return the state's bars (N, L), stretched or shortened where a motion sets the exposure's length.
 
     A shutter of the length "motion" is open while the subject that it follows moves by the shutter's distance
@@ -264,7 +264,7 @@ def reach(filmed: int) -> int:
     return 4 * filmed
 
 
-def seen(options: Options, at: Shown, count: int) -> range:
+def seen(options: Options, at: ShownFrame, count: int) -> range:
     """Return all source frames that the window can show, whichever cuts there are in the footage.
 
     The range lies in the footage. It always includes the shown frame, and is wider if the window can be moved away from
@@ -283,7 +283,7 @@ def seen(options: Options, at: Shown, count: int) -> range:
     return range(max(int(low), 0), min(int(high), count - 1) + 1)
 
 
-def times_of(clip: Clip, at: Shown, wanted: range, reach: int) -> list[float]:
+def times_of(clip: Clip, at: ShownFrame, wanted: range, reach: int) -> list[float]:
     """Return the timeline time at which each wanted source frame is shown, the one nearest to the shown frame.
 
     Args:
@@ -468,7 +468,7 @@ def with_length(bars: np.ndarray, way: np.ndarray, length: float, shown: float) 
     return shutters.spanning(bars, start, start + width)
 
 
-def exposed(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameState:
+def exposed(effect: Effect, state: FrameState, clip: Clip, at: ShownFrame) -> FrameState:
     """Replace the bars of shutters whose `length` is "timeline", so that they expose one timeline frame."""
     chosen = [i for i, shutter in enumerate(effect.shutters) if shutter.length == "timeline"]
     if not chosen:

@@ -407,7 +407,8 @@ def recipe_of(effect: model.Effect) -> dict[str, Any]:
 def _words(kind: type, part: Any) -> dict[str, Any]:
     """Return the declared properties of a part of an effect as fields of a recipe: {name in the recipe: JSON value}.
 
-    Unless Field.told is true, a property is left out if it has the value that a recipe without it means (Field.absent).
+    Unless Field.always_written is true, a property is left out if it has the value that a recipe without it means
+    (Field.absent).
 
     Args:
         kind: The class of the model that declares the properties.
@@ -418,7 +419,7 @@ def _words(kind: type, part: Any) -> dict[str, Any]:
     for name, each in fields_of(kind).items():
         if each.recipe:
             value = _keyable(getattr(part, name)) if each.is_channel else getattr(part, name)
-            if each.told or value != each.absent:
+            if each.always_written or value != each.absent:
                 said[each.recipe] = value
     return said
 

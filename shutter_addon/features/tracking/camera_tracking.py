@@ -18,7 +18,7 @@ from ...core.model.effect import Region, Subject
 from ...core.model.motions import Motion, Placement, Similarity
 from ...media.footage import Footage
 from . import registration, tracking
-from .registration import Part
+from .registration import TrackedPart
 from .tracking import FoundMotion, Tracked, TrackingError
 
 BARE = "the picture outside the regions has too few corners to follow"
@@ -89,7 +89,7 @@ class CameraTrack(tracking.Track):
                     return frame
         return None
 
-    def _part(self, frame: int) -> Part:
+    def _part(self, frame: int) -> TrackedPart:
         """Return what stands still in a frame: the picture outside the regions.
 
         Raises:
@@ -102,17 +102,17 @@ class CameraTrack(tracking.Track):
         free = registration.distances(covered) > _MARGIN * height if covered.any() else ~covered
         if not free.any():
             raise TrackingError(BARE)
-        part = Part(self._footage.picture(frame), free.astype(np.float32))
+        part = TrackedPart(self._footage.picture(frame), free.astype(np.float32))
         if len(part.points) < registration.FEWEST[self._motion]:
             raise TrackingError(BARE)
         return part
 
-    def _tracker(self, start: int) -> tuple[_Pursuit, float]:
-        found = _Pursuit(self._part, self._footage, start, self._motion)
+    def _tracker(self, start: int) -> tuple[_CameraTracker, float]:
+        found = _CameraTracker(self._part, self._footage, start, self._motion)
         return found, tracking.distinctness(found.anchor[0], self._footage.size[0])
 
 
-class _Pursuit:
+class _CameraTracker:
     """The camera's motion from the frame where tracking starts to one frame after another.
 
     Attributes:
@@ -122,7 +122,7 @@ class _Pursuit:
 
     reason = UNLIKE
 
-    def __init__(self, part_at: Callable[[int], Part], footage: Footage, frame: int, motion: Motion) -> None:
+    def __init__(self, part_at: Callable[[int], TrackedPart], footage: Footage, frame: int, motion: Motion) -> None:
         """Start to follow the camera at a frame.
 
         Args:
@@ -170,7 +170,7 @@ class _Pursuit:
         astray = [np.median(off[cells == cell]) > _OFF * height for cell in np.unique(cells)]
         return float(np.clip((_MOST - np.mean(astray)) / (_MOST - _FEW), 0, 1)) if astray else 1.0
 
-    def _compared(self, picture: np.ndarray, anchor: tuple[Part, int, Similarity]) -> FoundMotion:
+    def _compared(self, picture: np.ndarray, anchor: tuple[TrackedPart, int, Similarity]) -> FoundMotion:
         """Find the motion from the frame where tracking starts to a picture, by comparison with an anchor frame.
 
         The search starts where the camera would be at its last speed. If nothing is found, the last motion is returned
@@ -183,7 +183,7 @@ class _Pursuit:
         match = part.find(picture, self._speed.after(known).after(motion.inverse()), self._motion)
         return FoundMotion(match.motion.after(motion) if match else known, tracking.confidence(match, picture))
 
-    def _anchor_at(self, frame: int, motion: Similarity) -> tuple[Part, int, Similarity] | None:
+    def _anchor_at(self, frame: int, motion: Similarity) -> tuple[TrackedPart, int, Similarity] | None:
         with suppress(TrackingError):
             return self._part_at(frame), frame, motion
         return None

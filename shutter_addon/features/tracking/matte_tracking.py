@@ -86,13 +86,13 @@ class MatteTrack(tracking.Track):
     def _cover(self, frame: int) -> np.ndarray:
         return self._covers(frame, self._footage.size)
 
-    def _tracker(self, start: int) -> tuple[_Pursuit, float]:
+    def _tracker(self, start: int) -> tuple[_MatteTracker, float]:
         if not (self._cover(start) > _INSIDE).any():
             raise TrackingError(EMPTY)
-        return _Pursuit(self._cover, self._footage, start, self._motion), 1.0
+        return _MatteTracker(self._cover, self._footage, start, self._motion), 1.0
 
 
-class _Pursuit:
+class _MatteTracker:
     """The motion of what a matte covers, from the frame where tracking starts to one frame after another."""
 
     def __init__(self, cover: Callable[[int], np.ndarray], footage: Footage, frame: int, motion: Motion) -> None:

@@ -69,7 +69,7 @@ class Match:
     likeness: float = 0.0
 
 
-class Part:
+class TrackedPart:
     """A part of a picture that can be found in other pictures, by its corners: points that optical flow can follow.
 
     Corners have weights: how much they belong to the part. `learn` lowers those of corners of the background.
@@ -211,10 +211,10 @@ class Part:
         good &= inside(picture, known(self.points))
         return self.points[good], np.abs(moved - self.points)[good]
 
-    def again(self, picture: np.ndarray, motion: Similarity) -> Part | None:
+    def again(self, picture: np.ndarray, motion: Similarity) -> TrackedPart | None:
         """Take the part anew from another picture, where `motion` takes it; None: that is outside the picture."""
         weight = cv2.warpAffine(self.weight, matrix(motion), picture.shape[::-1])
-        return Part(picture, weight) if (weight > 0).any() else None
+        return TrackedPart(picture, weight) if (weight > 0).any() else None
 
     def learn(self, match: Match) -> None:
         """Lower the weights of seen corners that did not move with the part in a match; restore those that did."""

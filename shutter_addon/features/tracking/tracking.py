@@ -21,7 +21,7 @@ from ...core.model.effect import Region, Subject
 from ...core.model.motions import Motion, Placement, Similarity
 from ...media.footage import Footage
 from . import registration
-from .registration import Match, Part
+from .registration import Match, TrackedPart
 
 PATIENCE = 25  # frames for which a lost subject is searched
 
@@ -103,7 +103,7 @@ class PartTracker:
         reason: Why it was not found in the last picture, one of this module's sentences.
     """
 
-    def __init__(self, part: Part, footage: Footage, frame: int, motion: Motion) -> None:
+    def __init__(self, part: TrackedPart, footage: Footage, frame: int, motion: Motion) -> None:
         """Prepare to follow a part.
 
         Args:
@@ -239,7 +239,7 @@ class _Look:
         worth: How sure it is that this was the part, 0 to 1.
     """
 
-    part: Part
+    part: TrackedPart
     motion: Similarity
     worth: float
 
@@ -295,7 +295,7 @@ def lost(frames: np.ndarray, sure: np.ndarray) -> int | None:
     return None
 
 
-def distinctness(part: Part, width: int) -> float:
+def distinctness(part: TrackedPart, width: int) -> float:
     """Return how sure it is that a part is not confused with its surroundings, _REPEATED to 1.
 
     Args:
@@ -304,7 +304,7 @@ def distinctness(part: Part, width: int) -> float:
     return float(np.clip((1 - part.rival(_AROUND * width)) / (1 - registration.ALIKE), _REPEATED, 1))
 
 
-class Pursuit(Protocol):
+class MotionTracker(Protocol):
     """Follows something from frame to frame.
 
     Attributes:
@@ -358,7 +358,7 @@ class Track(ABC):
         yield from self._both_ways(start, range(min(frames), max(frames) + 1), {*anchors} - {start})
 
     @abstractmethod
-    def _tracker(self, start: int) -> tuple[Pursuit, float]:
+    def _tracker(self, start: int) -> tuple[MotionTracker, float]:
         """Return a tracker of the subject as shown at `start`, and a factor 0 to 1 for all its confidences.
 
         Raises:
@@ -459,9 +459,9 @@ class RegionTrack(Track):
 
     def __init__(self, region: Region) -> None:
         super().__init__(region)
-        self._parts: dict[int, tuple[Part, float]] = {}  # by start: both directions learn what belongs to it
+        self._parts: dict[int, tuple[TrackedPart, float]] = {}  # by start: both directions learn what belongs to it
 
-    def _part(self, frame: int) -> tuple[Part, float]:
+    def _part(self, frame: int) -> tuple[TrackedPart, float]:
         """Return the part of a frame that the region covers, and how sure it is that its corners belong to it, 0 to 1.
 
         Corners far from the region may belong to something else; so may those of a repeated pattern.
@@ -475,7 +475,7 @@ class RegionTrack(Track):
             raise TrackingError(OUTSIDE)
         picture, away = self._footage.picture(frame), registration.distances(covered)
         for reach in [share * height for share in _REACHES[shape.kind]]:
-            part = Part(picture, _falloff(away, reach))
+            part = TrackedPart(picture, _falloff(away, reach))
             if len(part.points) >= _ENOUGH:
                 break
         if len(part.points) < registration.FEWEST[self._motion]:

@@ -40,13 +40,13 @@ def run(arguments: Namespace) -> None:
     total, numbers = len(film.frames), itertools.count(1)
     with film_output.progress(total, "frame") as moved:
 
-        def told() -> None:
+        def frame_done() -> None:
             moved()
             command_line.print_line(f"{next(numbers)} of {total}")
             if arguments.attached:
                 _check_parent(film)
 
-        baked_film.render(scene, effect, strip, film, told)
+        baked_film.render(scene, effect, strip, film, frame_done)
     command_line.print_line(str(film.place))
 
 

@@ -34,7 +34,7 @@ class _Carrying:
             the others by their distance to `middle`.
         middle: The frame of the footage near which to begin. None: the middle one of `frames`.
         done: How many mattes the thread has made.
-        told: What `done` was when previews were redrawn to show the frames with a drawing; 0: not yet.
+        redrawn_at: What `done` was when previews were redrawn to show the frames with a drawing; 0: not yet.
         ended: Set this to stop the thread.
         soon: How many of `frames` have a drawing, at least 1. Previews are redrawn when that many mattes are made.
         future: Is done when the thread has ended. Its result is None, or it raises the thread's exception.
@@ -44,7 +44,7 @@ class _Carrying:
     frames: list[int]
     middle: int | None = None
     done: int = 0
-    told: int = 0
+    redrawn_at: int = 0
     ended: threading.Event = field(default_factory=threading.Event)
     soon: int = field(init=False)
     future: Future = field(init=False)
@@ -149,8 +149,8 @@ def _look() -> float | None:
         return None
     preview_areas.redraw(bpy.context)
     if not carrying.future.done():
-        if carrying.done >= carrying.soon > carrying.told:  # show drawings as soon as they are corrected
-            carrying.told = carrying.done
+        if carrying.done >= carrying.soon > carrying.redrawn_at:  # show drawings as soon as they are corrected
+            carrying.redrawn_at = carrying.done
             previews.show_carried()
         return TICK
     _mattes.carrying = None
