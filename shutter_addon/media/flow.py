@@ -4,8 +4,8 @@ OpenCV finds the flow in both directions. Each vector carries a pixel to its pla
 several vectors arrive at one place, the one whose two ends look most alike wins (Baker et al. 2011, "A database and
 evaluation methodology for optical flow"). The vectors that arrive say where to look up both frames, which are mixed.
 
-This takes longest. So it happens only for key moments, as many as the motion in each tile of the picture needs. Other
-moments are mixes of the key moments before and after them.
+This takes longest. So it happens only for key moments. Other moments are mixes of the key moments before and after
+them. The less a tile of the picture moves, and the smoother it is, the fewer key moments it needs.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ HALF_MAX = 65504  # the largest value of a half float, which infinite samples co
 # The most levels of 255 by which the ends of a good vector differ, in pictures with a mean of GREY or more. In darker
 # pictures it is less in proportion, but at least NOISE.
 UNLIKE, GREY, NOISE = 24.0, 90.0, 4.0
-AROUND = 15  # pixels of the halved pictures, over which costs are averaged
+AROUND = 15  # the side of the square over which costs are averaged, in pixels of the halved pictures
 SHARED = 0.5  # the share of vectors, in each direction, that have to be good
 # The farthest that a tile may always move between two key moments, in 1 / UNIT of a pixel. Mixes of pictures no farther
-# apart look as good as pictures made by flow. Where the picture is smooth, a tile may move farther: until a mix differs
-# from the true picture by so many levels of 255.
-FARTHEST, VISIBLE = UNIT, 6.0
+# apart look as good as pictures made by flow. Where pictures are smooth, a tile may move farther: until a mix differs
+# from the true picture by about VISIBLE levels of 255.
+FARTHEST, VISIBLE = UNIT, 12.0
 _KEPT = 4  # cached key moments, and cached sets of vectors
 VERSION = 4  # raise it when `found` gives something else of the same pictures
 
@@ -71,7 +71,8 @@ class Between:
         if not np.array_equal(first, second):
             pictures = [luma(end, transfer, alpha) for end in self.ends]
             sides = [_carriers(each) for each in np.split((find or found)(*pictures), 2, axis=2)]
-            self._sides, self._farthest = sides if _meet(pictures, sides) else None, _farthest(pictures)
+            if _meet(pictures, sides):
+                self._sides, self._farthest = sides, _farthest(self.ends)
 
     def with_ends(self, first: np.ndarray, second: np.ndarray) -> Between:
         """Return a copy that makes moments between two other frames (H, W, 4) by the flow found here."""
@@ -281,17 +282,19 @@ def _meet(pictures: list[np.ndarray], sides: list[_Carriers]) -> bool:
     return min(float((costs[1:] <= unlike).mean()) for _places, _vectors, costs in sides) >= SHARED
 
 
-def _farthest(pictures: list[np.ndarray]) -> np.ndarray:
+def _farthest(ends: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
     """Return how far each tile (rows, columns) may move between two key moments, in 1 / UNIT of a pixel.
 
-    A mix of two pictures that are d pixels apart differs from the picture between them by at most d² / 8 times its
-    second derivative.
+    A mix of two pictures that are d pixels apart differs from the picture between them by about d² / 8 times its second
+    derivative. The highest one in a tile and the tiles around it counts, in both frames.
 
     Args:
-        pictures: Both frames, grey (H, W) uint8.
+        ends: Both frames, (H, W, 4). If they are not 8-bit, the result is FARTHEST for all tiles, without dimensions.
     """
-    bends = (np.abs(cv2.Laplacian(cv2.blur(each, (3, 3)), cv2.CV_16S)) for each in pictures)
-    bend = cv2.dilate(_tiles(np.maximum(*bends)).astype(np.float32), np.ones((3, 3), np.uint8))
+    if ends[0].dtype != np.uint8:
+        return np.array(FARTHEST, np.float32)
+    bends = [_tiles(cv2.convertScaleAbs(cv2.Laplacian(each, cv2.CV_16S))) for each in ends]
+    bend = cv2.dilate(np.maximum(*bends), np.ones((3, 3), np.uint8)).astype(np.float32)
     return np.maximum(np.float32(FARTHEST), UNIT * np.sqrt(8 * VISIBLE / np.maximum(bend, 1)))
 
 
@@ -299,13 +302,14 @@ def _tiles(values: np.ndarray, apart: int = 1) -> np.ndarray:
     """Return the highest value in each tile of a picture, (rows, columns).
 
     Args:
-        values: Values of every `apart`th pixel, (h, w), not negative.
-        apart: A divisor of TILE.
+        values: Values of every `apart`th pixel, (h, w) or (h, w, C), not negative.
+        apart: A divisor of both sides of a TILE.
     """
     across, down = (length // apart for length in TILE)
-    height, width = values.shape
-    whole = np.pad(values, ((0, -height % down), (0, -width % across)))
-    return whole.reshape(-1, down, whole.shape[1]).max(axis=1).reshape(len(whole) // down, -1, across).max(axis=2)
+    height, width = values.shape[:2]
+    whole = np.pad(values, ((0, -height % down), (0, -width % across), *[(0, 0)] * (values.ndim - 2)))
+    rows = whole.reshape(-1, down, whole[0].size).max(axis=1)
+    return rows.reshape(len(rows), -(-width // across), -1).max(axis=2)
 
 
 def _of_keys(
@@ -313,7 +317,8 @@ def _of_keys(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return Moment.vectors and Moment.levels for the moments between two frames.
 
-    `levels` tells for each tile of the picture how many of the key moments it needs: the less it moves, the fewer.
+    `levels` tells for each tile of the picture how many of the key moments it needs: the less it moves and the smoother
+    it is, the fewer.
 
     Args:
         sides: The vectors from the first frame to the second, and those from the second to the first.
@@ -324,9 +329,11 @@ def _of_keys(
     paths = np.stack([_paths(sides, shape, key / keys) for key in range(1, keys)])
     most, least = (each[..., :2].astype(np.float32) - ZERO for each in (paths.max(axis=0), paths.min(axis=0)))
     # A pixel's path is interpolated between its cell and the next ones to the right and below.
-    moved = cv2.dilate(np.maximum(most, -least).max(axis=2), np.ones((2, 2), np.uint8), anchor=(0, 0))
+    moved = _tiles(cv2.dilate(np.maximum(most, -least).max(axis=2), np.ones((2, 2), np.uint8), anchor=(0, 0)), STEP)
+    # What moves farther than a tile comes from beyond the tiles that `farthest` is of.
+    farthest = np.where(moved > min(TILE) * UNIT, np.float32(FARTHEST), farthest)
     steps = 1 << np.arange(keys.bit_length() - 1)
-    return paths, np.searchsorted(steps, _tiles(moved, STEP) / farthest).astype(np.uint8)
+    return paths, np.searchsorted(steps, moved / farthest).astype(np.uint8)
 
 
 def _paths(sides: list[_Carriers], shape: tuple[int, ...], t: float) -> np.ndarray:

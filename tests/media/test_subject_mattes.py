@@ -112,12 +112,16 @@ def test_deleted_mattes_are_made_again(opened, tmp_path):
     assert np.array_equal(mattes.read(2), made)
 
 
-def test_damaged_mattes_end_nothing(opened, tmp_path):
-    made = opened({0: [on_first(0)]}).read(2)
-    one, two = sorted((tmp_path / "mattes").rglob("*.png"))[1:]
-    one.write_bytes(one.read_bytes()[:-100])
-    two.unlink()
-    assert np.array_equal(opened({0: [on_first(0)]}).read(2), made)
+@pytest.mark.parametrize(("damaged", "missing"), [(0, 2), (1, 2), (2, 0)])
+def test_damaged_mattes_end_nothing(opened, tmp_path, damaged, missing):
+    mattes = opened({0: [on_first(0)]})
+    made, sure = mattes.read(2), mattes.confidence(2)
+    files = sorted((tmp_path / "mattes").rglob("*.png"))
+    files[damaged].write_bytes(files[1].read_bytes()[:-100])
+    files[missing].unlink()
+    again = opened({0: [on_first(0)]})
+    assert np.array_equal(again.read(2), made)
+    assert again.confidence(2) == sure
 
 
 def test_it_ends_at_a_cut(opened):

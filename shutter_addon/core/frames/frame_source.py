@@ -172,7 +172,7 @@ class Moment:
     The time between the two frames is divided into `keys` equal parts. Their bounds are key moments: number 0 is the
     first frame, number `keys` the second. At a key moment between them, each pixel is a mix of two pixels, one of each
     frame, at the ends of the motion path (from optical flow) that passes there. Any other time is a mix of the key
-    moments before and after it, in linear light. Parts of the picture that move little use only some key moments.
+    moments before and after it, in linear light. Parts that move little or are smooth use only some.
 
     Attributes:
         pair: The numbers of the two frames, counting filmed frames only. They are neighbors, unless the frames between

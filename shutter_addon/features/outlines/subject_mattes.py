@@ -499,7 +499,7 @@ class SubjectMattes(CarriedMattes):
             around = [self._keys[end] for end in nearest(frame, self._showing) if end is not None]
             self._keys[frame] = derived.key({"strokes": self._keys[frame], "around": around})
         self._before: tuple[int, np.ndarray, np.ndarray] | None = None
-        self._written: tuple[Path, np.ndarray] | None = None  # the last matte
+        self._last: tuple[Path, np.ndarray] | None = None  # the last matte that was read or written
 
     def read(self, index: int) -> np.ndarray:
         """Return a frame's matte, (height, width) float32, 0 to 1. Without any keyframes, it is empty.
@@ -515,7 +515,7 @@ class SubjectMattes(CarriedMattes):
         """
         index = min(max(index, 0), self.count - 1)
         sides = self._sides(index, makes=True) or []
-        mattes = [(self._kept(path), share) for path, share, _sure in sides]
+        mattes = [(self._levels(path), share) for path, share, _sure in sides]
         shown = [(np.where(it == EXCLUDED, 0, it) / np.float32(255), share) for it, share in mattes if it is not None]
         return mixed(shown) if shown else self._nothing()
 
@@ -538,7 +538,7 @@ class SubjectMattes(CarriedMattes):
 
         Args:
             index: The frame of the footage.
-            makes: Whether to make missing files.
+            makes: Whether to make missing and damaged files.
 
         Returns:
             For each chain, that of the nearer keyframe first: the file; its share of the matte (shares add up to 1, or
@@ -552,7 +552,7 @@ class SubjectMattes(CarriedMattes):
             share = min(max(MIDDLE * (0.5 - abs(end - index) / span) + 0.5, 0.0), 1.0) if len(ends) > 1 else 1.0
             if share == 0 and sides[0][2] != GONE:
                 break  # the nearest keyframe alone counts
-            if makes and self._sure(index, end) is None:
+            if makes and self._known(index, end) is None:
                 with self._claimed(index, end, None) as kept:
                     if kept is None:
                         self._make(index, end)
@@ -571,7 +571,7 @@ class SubjectMattes(CarriedMattes):
         """Make and write a chain's mattes up to a frame, from its keyframe `end` or the last that a file keeps."""
         step = 1 if index > end else -1
         start, known = index, self._known(index, end)
-        while known is None and start != end:
+        while start != end and (known is None or self._sure(end, end) is None):
             start -= step
             known = self._known(start, end)
         known = known or self._write(end, end, *self._first(end))
@@ -584,9 +584,17 @@ class SubjectMattes(CarriedMattes):
         """Return a chain's matte (H, W) uint8 and its confidence; None: its file is missing or damaged."""
         if (sure := self._sure(frame, end)) is None:
             return None
-        path = self._path(frame, end, None)
-        matte = self._written[1] if self._written and self._written[0] == path else self._kept(path)
+        matte = self._levels(self._path(frame, end, None))
         return None if matte is None else (matte, sure)
+
+    def _levels(self, path: Path) -> np.ndarray | None:
+        """Return the matte (H, W) uint8 in a file; None: it is missing or damaged."""
+        last = self._last
+        if last is None or last[0] != path:
+            if (matte := self._kept(path)) is None:
+                return None
+            self._last = last = path, matte
+        return last[1]
 
     def _write(
         self, frame: int, end: int, matte: np.ndarray, excluded: np.ndarray, sure: float
@@ -598,8 +606,8 @@ class SubjectMattes(CarriedMattes):
             levels[(levels < EXCLUDED) & (_fitted(excluded, levels) > 0.5)] = EXCLUDED
         path = self._path(frame, end, None)
         write_levels(path, levels, f"{CONFIDENCE}{sure:.3f}")
-        self._written = path, levels
-        return levels, round(sure, 3)
+        self._last = path, levels
+        return levels, round(float(sure), 3)
 
     def _first(self, frame: int) -> tuple[np.ndarray, np.ndarray, float]:
         """Make the matte of a keyframe (with strokes or a drawing), at which a chain of mattes begins.
