@@ -58,8 +58,8 @@ def _in_fours(plane: np.ndarray) -> np.ndarray:
 def _by_level(moment: Moment, part: Part, given: Given) -> Iterator[tuple[int, tuple[int, int], Given]]:
     """Yield the shader passes that add a computed frame to a part of the window.
 
-    In tiles with little motion, the frame needs fewer lookups along the motion (Moment.levels). Tiles of equal level
-    share a pass. A level without tiles in this part needs none.
+    In tiles that move little or are smooth, the frame needs fewer lookups along the motion (Moment.levels). Tiles of
+    equal level share a pass. A level without tiles in this part needs none.
 
     Args:
         moment: The computed frame.

@@ -303,7 +303,7 @@ def _tiles(values: np.ndarray, apart: int = 1) -> np.ndarray:
 
     Args:
         values: Values of every `apart`th pixel, (h, w) or (h, w, C), not negative.
-        apart: A divisor of both sides of a TILE.
+        apart: A divisor of both sides of a tile.
     """
     across, down = (length // apart for length in TILE)
     height, width = values.shape[:2]
@@ -330,7 +330,7 @@ def _of_keys(
     most, least = (each[..., :2].astype(np.float32) - ZERO for each in (paths.max(axis=0), paths.min(axis=0)))
     # A pixel's path is interpolated between its cell and the next ones to the right and below.
     moved = _tiles(cv2.dilate(np.maximum(most, -least).max(axis=2), np.ones((2, 2), np.uint8), anchor=(0, 0)), STEP)
-    # What moves farther than a tile comes from beyond the tiles that `farthest` is of.
+    # `_farthest` looks only at a tile and those around it. What moves farther comes from outside them.
     farthest = np.where(moved > min(TILE) * UNIT, np.float32(FARTHEST), farthest)
     steps = 1 << np.arange(keys.bit_length() - 1)
     return paths, np.searchsorted(steps, moved / farthest).astype(np.uint8)

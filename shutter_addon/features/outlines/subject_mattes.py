@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from ...core import stopping
+from ...core.caches import RecentValues
 from ...core.frames.frame_source import FrameSource, SourceFile
 from ...core.messages import MediaError, of_file
 from ...core.model import outlines, scribbles
@@ -499,7 +500,7 @@ class SubjectMattes(CarriedMattes):
             around = [self._keys[end] for end in nearest(frame, self._showing) if end is not None]
             self._keys[frame] = derived.key({"strokes": self._keys[frame], "around": around})
         self._before: tuple[int, np.ndarray, np.ndarray] | None = None
-        self._last: tuple[Path, np.ndarray] | None = None  # the last matte that was read or written
+        self._recent: RecentValues[Path, np.ndarray] = RecentValues()  # mattes that were read or written, (H, W) uint8
 
     def read(self, index: int) -> np.ndarray:
         """Return a frame's matte, (height, width) float32, 0 to 1. Without any keyframes, it is empty.
@@ -570,8 +571,10 @@ class SubjectMattes(CarriedMattes):
     def _make(self, index: int, end: int) -> None:
         """Make and write a chain's mattes up to a frame, from its keyframe `end` or the last that a file keeps."""
         step = 1 if index > end else -1
+        if self._sure(end, end) is None:
+            self._write(end, end, *self._first(end))
         start, known = index, self._known(index, end)
-        while start != end and (known is None or self._sure(end, end) is None):
+        while known is None and start != end:
             start -= step
             known = self._known(start, end)
         known = known or self._write(end, end, *self._first(end))
@@ -589,12 +592,9 @@ class SubjectMattes(CarriedMattes):
 
     def _levels(self, path: Path) -> np.ndarray | None:
         """Return the matte (H, W) uint8 in a file; None: it is missing or damaged."""
-        last = self._last
-        if last is None or last[0] != path:
-            if (matte := self._kept(path)) is None:
-                return None
-            self._last = last = path, matte
-        return last[1]
+        if (matte := self._recent.get(path)) is None and (matte := self._kept(path)) is not None:
+            self._recent.keep(path, matte, 2)
+        return matte
 
     def _write(
         self, frame: int, end: int, matte: np.ndarray, excluded: np.ndarray, sure: float
@@ -606,8 +606,7 @@ class SubjectMattes(CarriedMattes):
             levels[(levels < EXCLUDED) & (_fitted(excluded, levels) > 0.5)] = EXCLUDED
         path = self._path(frame, end, None)
         write_levels(path, levels, f"{CONFIDENCE}{sure:.3f}")
-        self._last = path, levels
-        return levels, round(float(sure), 3)
+        return self._recent.keep(path, levels, 2), round(float(sure), 3)
 
     def _first(self, frame: int) -> tuple[np.ndarray, np.ndarray, float]:
         """Make the matte of a keyframe (with strokes or a drawing), at which a chain of mattes begins.
