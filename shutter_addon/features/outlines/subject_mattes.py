@@ -571,8 +571,8 @@ class SubjectMattes(CarriedMattes):
     def _make(self, index: int, end: int) -> None:
         """Make and write a chain's mattes up to a frame, from its keyframe `end` or the last that a file keeps."""
         step = 1 if index > end else -1
-        if self._sure(end, end) is None:
-            self._write(end, end, *self._first(end))
+        if (most := self._sure(end, end)) is None:
+            _, most = self._write(end, end, *self._first(end))
         start, known = index, self._known(index, end)
         while known is None and start != end:
             start -= step
@@ -580,15 +580,15 @@ class SubjectMattes(CarriedMattes):
         known = known or self._write(end, end, *self._first(end))
         for frame in range(start, index, step):
             stopping.check()
-            known = self._write(frame + step, end, *self._next(known, frame, frame + step, end))
+            known = self._write(frame + step, end, *self._next(known, frame, frame + step, most))
         self._shots.release()
 
     def _known(self, frame: int, end: int) -> tuple[np.ndarray, float] | None:
         """Return a chain's matte (H, W) uint8 and its confidence; None: its file is missing or damaged."""
-        if (sure := self._sure(frame, end)) is None:
+        path = self._path(frame, end, None)
+        if (sure := self._described(path)) is None or (matte := self._levels(path)) is None:
             return None
-        matte = self._levels(self._path(frame, end, None))
-        return None if matte is None else (matte, sure)
+        return matte, sure
 
     def _levels(self, path: Path) -> np.ndarray | None:
         """Return the matte (H, W) uint8 in a file; None: it is missing or damaged."""
@@ -632,7 +632,7 @@ class SubjectMattes(CarriedMattes):
         return refined(picture, what.share), what.excluded, what.confidence
 
     def _next(
-        self, known: tuple[np.ndarray, float], before: int, frame: int, end: int
+        self, known: tuple[np.ndarray, float], before: int, frame: int, most: float
     ) -> tuple[np.ndarray, np.ndarray, float]:
         """Make the matte of the next frame in a chain from the one of the frame before.
 
@@ -640,7 +640,7 @@ class SubjectMattes(CarriedMattes):
             known: The matte of the frame before, (H, W) uint8, and its confidence.
             before: The frame before.
             frame: The next frame of the chain, one later or earlier in time.
-            end: The keyframe at which the chain begins.
+            most: The confidence at the keyframe where the chain begins, 0 to 1. A chain is no surer of what it follows.
 
         Returns:
             The matte, (H, W) float32, 0 to 1; what strokes exclude from it, carried along, (h, w) float32 in the
@@ -662,8 +662,7 @@ class SubjectMattes(CarriedMattes):
         what, still = followed(self._network, old, small, found_before, lambda: self._background.behind(frame, small))
         found_there = refined(picture, what.share)
         found_there += _fitted(still, matte) * (matte / np.float32(255) - found_there)
-        # A chain is no surer of what it follows than its keyframe is.
-        return found_there, what.excluded, min(what.confidence, self._sure(end, end) or 0.0)
+        return found_there, what.excluded, min(what.confidence, most)
 
     def _pictures(self, frame: int) -> tuple[np.ndarray, np.ndarray]:
         """Return a frame as displayed, (H, W, 3) uint8, and reduced as working picture (h, w, 3)."""
